@@ -1,0 +1,38 @@
+use super::{Description, Effect, Readings};
+
+crate::variables! {
+    /// A position sensor whose zero is not at the rest length.
+    ///
+    /// # Model
+    /// x_measured ← x_measured + o: `offset` o.
+    ///
+    /// # In the data
+    /// A constant residual of the contraction, also at rest. Without it in the force, it is not a change of the muscle.
+    ///
+    /// # Reference
+    /// Definition of an offset.
+    pub struct ContractionSensorOffset in "contraction_sensor_offset." as Tunable {
+        /// What the position sensor shows at rest length
+        offset: f64 = 0.0, METRE, (-0.2..=0.2);
+    }
+}
+
+impl Effect for ContractionSensorOffset {
+    const DESCRIPTION: Description = Description {
+        name: "contraction_sensor_offset",
+        meaning: "the zero of the position sensor is not at the rest length",
+        equation: "x_measured <- x_measured + o",
+        signature: "constant residual of the contraction, also at rest",
+        experiment: "read the sensor with the muscle empty and unloaded",
+        reference: "definition",
+        free: &[("contraction_sensor_offset.offset", 1e-3)],
+    };
+
+    fn readings(&self, readings: Readings) -> Readings {
+        Readings { contraction: readings.contraction + self.offset, ..readings }
+    }
+
+    fn sentence(&self) -> String {
+        format!("The position sensor shows {:+.2} mm at the rest length.", self.offset * 1e3)
+    }
+}

@@ -1,0 +1,49 @@
+use super::{Description, Effect, Point};
+
+crate::variables! {
+    /// Viscous damping beyond the nominal one, different for shortening and lengthening.
+    ///
+    /// # Model
+    /// F ← F − B v, with B = `contraction` for v > 0 and `extension` for v < 0.
+    ///
+    /// # In the data
+    /// A loop of the force residual that grows with speed; the same triangle at three speeds separates it from dry
+    /// friction.
+    ///
+    /// # Validity
+    /// Together with `muscle.damping` the sum must not be negative for the motion to be damped.
+    ///
+    /// # Reference
+    /// D. Reynolds et al. (2003), Modeling the dynamic characteristics of pneumatic muscle, doi 10.1114/1.1554921
+    /// (damping of inflation and deflation); thesis eq. 3.47.
+    pub struct ViscousDamping in "viscous_damping." as Tunable {
+        /// Additional damping while the muscle shortens
+        contraction: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-100.0..=1e4);
+        /// Additional damping while the muscle lengthens
+        extension: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-100.0..=1e4);
+    }
+}
+
+impl Effect for ViscousDamping {
+    const DESCRIPTION: Description = Description {
+        name: "viscous_damping",
+        meaning: "a loss that grows with velocity, unlike in shortening and lengthening",
+        equation: "F <- F - B v,  B = B_contraction (v > 0) or B_extension (v < 0)",
+        signature: "loop of the force residual grows with speed",
+        experiment: "the same triangle at three speeds",
+        reference: "Reynolds et al. 2003; thesis eq. 3.47",
+        free: &[("viscous_damping.contraction", 200.0), ("viscous_damping.extension", 200.0)],
+    };
+
+    fn muscle_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
+        let v = at.contraction_velocity;
+        force - v * if v > 0.0 { self.contraction } else { self.extension }
+    }
+
+    fn sentence(&self) -> String {
+        format!(
+            "Viscous damping: {:.0} N s/m more than nominal while shortening, {:.0} N s/m while lengthening.",
+            self.contraction, self.extension
+        )
+    }
+}

@@ -1,0 +1,126 @@
+//! What can go wrong, as facts; the sentence a person reads is made from them here.
+
+use std::path::PathBuf;
+
+/// Anything that keeps Sinew from doing what was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A value outside the range that its declaration allows.
+    #[error("`{variable}` is {value} {unit}, allowed is {min} to {max} {unit}")]
+    OutOfRange {
+        /// Full name of the variable.
+        variable: String,
+        /// The value that was refused.
+        value: f64,
+        /// Smallest allowed value.
+        min: f64,
+        /// Largest allowed value.
+        max: f64,
+        /// Unit of all three.
+        unit: &'static str,
+    },
+    /// A name that no variable carries.
+    #[error("there is no parameter `{name}`; `sinew list variables` shows all")]
+    UnknownParameter {
+        /// The name that was asked for.
+        name: String,
+    },
+    /// A value of the wrong kind for its variable.
+    #[error("`{name}` takes {expected}, not `{found}`")]
+    WrongKind {
+        /// Full name of the variable.
+        name: String,
+        /// What the variable takes, in words.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// Neither a preset nor a file.
+    #[error("there is no preset or parameter file `{name}`; presets are {known}")]
+    UnknownPreset {
+        /// What was asked for.
+        name: String,
+        /// The names of all presets.
+        known: String,
+    },
+    /// A parameter file that is not TOML.
+    #[error("{source_name}: line {line}: {problem}")]
+    Toml {
+        /// File or preset name.
+        source_name: String,
+        /// Line, from 1.
+        line: usize,
+        /// What the parser said.
+        problem: String,
+    },
+    /// A parameter file with a value that cannot be used.
+    #[error("{source_name}: {problem}")]
+    ParameterFile {
+        /// File or preset name.
+        source_name: String,
+        /// Which value, and why not.
+        problem: Box<Error>,
+    },
+    /// The load does not hang still at this pressure for any length of the muscle.
+    #[error(
+        "no length of the muscle holds {mass} kg at {gauge_pressure} Pa: \
+         change `load.mass` or `initial.gauge_pressure`"
+    )]
+    NoEquilibrium {
+        /// Total hanging mass, kg.
+        mass: f64,
+        /// Gauge pressure at the start, Pa.
+        gauge_pressure: f64,
+    },
+    /// The simulation left the range in which the model means anything.
+    #[error("the simulation diverged at {time} s: `{variable}` is no longer meaningful")]
+    Diverged {
+        /// Simulated time, s.
+        time: f64,
+        /// The first state that left its range.
+        variable: &'static str,
+    },
+    /// Saved model state that this model cannot read.
+    #[error("the saved state cannot be restored: {problem}")]
+    SavedState {
+        /// What does not fit.
+        problem: &'static str,
+    },
+    /// A recording (CSV) that cannot be read.
+    #[error("{}: line {line}{}: {problem}", path.display(), column.as_ref().map(|c| format!(", column `{c}`")).unwrap_or_default())]
+    Csv {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u64,
+        /// Column name, where one is to blame.
+        column: Option<String>,
+        /// What is wrong and what to do.
+        problem: String,
+    },
+    /// A recording that lacks what the work needs.
+    #[error("{}: {problem}", path.display())]
+    Recording {
+        /// The file.
+        path: PathBuf,
+        /// What is missing and what to do.
+        problem: String,
+    },
+    /// A file that cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// A platform that FMI does not know.
+    #[error("`{argument}` is not PLATFORM=FILE with PLATFORM one of linux64, linux32, win64, win32, darwin64")]
+    Platform {
+        /// What was given.
+        argument: String,
+    },
+}
+
+/// `Result` with Sinew's [`enum@Error`].
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,125 @@
+//! Adaptive Runge–Kutta integration of a small system whose size is known to the compiler.
+//!
+//! # Model
+//! The pair 5(4) of Dormand and Prince with a proportional step controller. The step that the controller proposes is
+//! part of the state of a simulation, so that saving and restoring reproduces a run bit for bit. The largest scaled
+//! error of any state decides, not their mean: a state that rests changes nothing.
+//!
+//! # Reference
+//! J. Dormand, P. Prince (1980), A family of embedded Runge–Kutta formulae, doi 10.1016/0771-050X(80)90013-3;
+//! E. Hairer, S. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, II.4.
+
+/// Error of one step, relative to the scale of each state, that is accepted.
+pub const TOLERANCE: f64 = 1e-8;
+const LARGEST_STEP: f64 = 0.05;
+const SMALLEST_STEP: f64 = 1e-9;
+
+/// Coefficients of the stages (Butcher tableau), without the first row.
+const A: [&[f64]; 6] = [
+    &[1.0 / 5.0],
+    &[3.0 / 40.0, 9.0 / 40.0],
+    &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
+    &[19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0],
+    &[9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
+    &[35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
+];
+/// Instants of the stages, as fractions of the step.
+const C: [f64; 6] = [1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
+/// Difference of the two solutions: the error estimate.
+const E: [f64; 7] =
+    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+
+/// Integration left the range of numbers, or no step was small enough.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Failed {
+    /// Time since the start of the interval, s.
+    pub after: f64,
+    /// Index of the state to blame.
+    pub state: usize,
+}
+
+/// Advances `state` over `duration` seconds.
+///
+/// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `scale` is the usual size of
+/// each state; `step` is the step proposed by the last call and is updated.
+///
+/// # Errors
+/// [`Failed`] when a state is not finite or the step would fall below a nanosecond; `state` is then meaningless.
+#[inline]
+pub fn advance<const N: usize>(
+    rates: impl Fn(f64, &[f64; N], &mut [f64; N]),
+    scale: &[f64; N],
+    state: &mut [f64; N],
+    step: &mut f64,
+    duration: f64,
+) -> Result<(), Failed> {
+    let mut time = 0.0;
+    let mut stages = [[0.0; N]; 7];
+    rates(0.0, state, &mut stages[0]);
+    loop {
+        let rest = duration - time;
+        // A rest that is hardly longer than the step is done in one, not in one and a sliver.
+        let last = rest <= *step * 1.000_001;
+        let h = if last { rest } else { *step };
+        let next = one_step(&rates, time, h, state, &mut stages);
+        let (error, worst) = scaled_error(&stages, h, scale, state, &next);
+        if error <= 1.0 {
+            *state = next;
+            time += h;
+            stages[0] = stages[6]; // first same as last
+        }
+        let proposal = h * (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 5.0);
+        // A step cut short by the end of the interval says nothing against the longer one.
+        if error > 1.0 || !last || proposal > *step {
+            *step = proposal.min(LARGEST_STEP);
+        }
+        if error <= 1.0 && last {
+            return Ok(());
+        }
+        if *step < SMALLEST_STEP {
+            return Err(Failed { after: time, state: worst });
+        }
+    }
+}
+
+#[inline]
+fn one_step<const N: usize>(
+    rates: &impl Fn(f64, &[f64; N], &mut [f64; N]),
+    time: f64,
+    h: f64,
+    state: &[f64; N],
+    stages: &mut [[f64; N]; 7],
+) -> [f64; N] {
+    let mut trial = *state;
+    for s in 0..6 {
+        for i in 0..N {
+            let slope: f64 = A[s].iter().zip(stages.iter()).map(|(a, k)| a * k[i]).sum();
+            trial[i] = state[i] + h * slope;
+        }
+        rates(time + C[s] * h, &trial, &mut stages[s + 1]);
+    }
+    trial // the last stage is the solution of order five
+}
+
+#[inline]
+fn scaled_error<const N: usize>(
+    stages: &[[f64; N]; 7],
+    h: f64,
+    scale: &[f64; N],
+    state: &[f64; N],
+    next: &[f64; N],
+) -> (f64, usize) {
+    let (mut largest, mut worst) = (0.0_f64, 0);
+    for i in 0..N {
+        if !next[i].is_finite() {
+            return (f64::INFINITY, i);
+        }
+        let difference: f64 = E.iter().zip(stages).map(|(e, k)| e * k[i]).sum();
+        let size = scale[i].max(state[i].abs()).max(next[i].abs());
+        let error = (h * difference).abs() / (TOLERANCE * size);
+        if error > largest {
+            (largest, worst) = (error, i);
+        }
+    }
+    (largest, worst)
+}

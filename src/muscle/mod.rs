@@ -1,0 +1,138 @@
+//! The muscle at rest and its static force models, one file per model.
+
+mod improved_mckibben;
+mod virtual_area;
+
+pub use improved_mckibben::ImprovedMcKibben;
+pub use virtual_area::VirtualArea;
+
+use crate::variables::{Choice, Kind, Scalar};
+use std::f64::consts::PI;
+
+crate::variables! {
+    /// The muscle: its braid at rest, its damping, and which force model holds.
+    ///
+    /// # Model
+    /// A thread of length b winds n times around a cylinder of length L and diameter D:
+    /// L = b cos θ, D = b sin θ / (n π), so D = √(b² − L²) / (n π).
+    ///
+    /// # Reference
+    /// Thesis eqs. 3.4–3.5; n = 3.5, b = 1.0877 m, θ₀ = 25.7° from section 4.3.3.
+    pub struct Muscle in "muscle." as Tunable {
+        /// Which static force model is used
+        force_model: ForceModelName = ForceModelName::VirtualArea, ONE, (1.0..=2.0);
+        /// Length at rest
+        rest_length: f64 = 0.980_101_476, METRE, (0.02..=10.0);
+        /// Length of one thread of the braid
+        thread_length: f64 = 1.0877, METRE, (0.02..=12.0);
+        /// Turns of one thread around the muscle
+        turns: f64 = 3.5, ONE, (0.05..=100.0);
+        /// Viscous damping inside the muscle
+        damping: f64 = 80.0, NEWTON_SECOND_PER_METRE, (0.0..=1e5);
+    }
+}
+
+impl Muscle {
+    /// Diameter in m of the braid at a contraction in m.
+    ///
+    /// NaN where the muscle would be longer than its thread.
+    pub fn diameter(&self, contraction: f64) -> f64 {
+        let length = self.rest_length - contraction;
+        (self.thread_length.powi(2) - length.powi(2)).sqrt() / (self.turns * PI)
+    }
+
+    /// Volume in m³ of the braid, taken as a cylinder, at a contraction in m (thesis eq. 3.6).
+    pub fn volume(&self, contraction: f64) -> f64 {
+        PI / 4.0 * self.diameter(contraction).powi(2) * (self.rest_length - contraction)
+    }
+}
+
+/// A static force model whose pull is affine in pressure: F = p A(x) + F_e(x).
+///
+/// The feed-forward of the controller inverts it in this form.
+pub trait ForceModel {
+    /// Virtual area A = −dV/dL in m² at a contraction in m: newtons gained per pascal.
+    fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64;
+
+    /// Force in N of the elastic membrane at a contraction in m; negative where it resists shortening.
+    fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64;
+
+    /// Static pull in N at a gauge pressure in Pa and a contraction in m.
+    fn force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
+        gauge_pressure * self.virtual_area(muscle, contraction) + self.elastic_force(muscle, contraction)
+    }
+}
+
+macro_rules! force_models {
+    ($($Variant:ident($Model:ident, $field:ident) = $number:literal, $name:literal, $description:literal;)*) => {
+        /// The choice of a static force model.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum ForceModelName {
+            $(#[doc = $description] $Variant = $number,)*
+        }
+
+        impl ForceModelName {
+            /// All choices, in the order of their numbers.
+            pub const CHOICES: &'static [Choice] = &[$(Choice { name: $name, description: $description },)*];
+        }
+
+        impl Scalar for ForceModelName {
+            const KIND: Kind = Kind::Enumeration("ForceModel", Self::CHOICES);
+            fn to_number(self) -> f64 {
+                f64::from(self as i32)
+            }
+            fn from_number(number: f64) -> Self {
+                let all = [$(Self::$Variant),*];
+                all.into_iter().find(|choice| choice.to_number() == number).unwrap_or(all[0])
+            }
+        }
+
+        /// The coefficients of every force model; [`Muscle::force_model`] says which of them are used.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct ForceModels {
+            $(#[doc = concat!("Coefficients of `", $name, "`.")] pub $field: $Model,)*
+        }
+
+        impl ForceModels {
+            /// The model that is chosen.
+            #[inline]
+            fn chosen(&self, name: ForceModelName) -> &dyn ForceModel {
+                match name { $(ForceModelName::$Variant => &self.$field,)* }
+            }
+        }
+
+        impl crate::variables::Declared for ForceModels {
+            fn visit(&self, see: &mut dyn FnMut(&'static crate::variables::Variable, f64)) {
+                $(self.$field.visit(see);)*
+            }
+            fn visit_mut(&mut self, change: &mut dyn FnMut(&'static crate::variables::Variable, f64) -> f64) {
+                $(self.$field.visit_mut(change);)*
+            }
+        }
+    };
+}
+
+// One line per model: adding a model is its file and a line here.
+force_models! {
+    VirtualArea(VirtualArea, virtual_area) = 1, "virtual-area",
+        "pressure times a virtual area, plus an elastic force, both polynomials of the contraction (thesis eq. 4.5)";
+    ImprovedMcKibben(ImprovedMcKibben, improved_mckibben) = 2, "improved-mckibben",
+        "McKibben braid with the elasticity of the membrane (thesis eq. 4.17, corrected)";
+}
+
+impl ForceModels {
+    /// Virtual area in m² of the chosen model.
+    pub fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64 {
+        self.chosen(muscle.force_model).virtual_area(muscle, contraction)
+    }
+
+    /// Elastic force in N of the chosen model.
+    pub fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64 {
+        self.chosen(muscle.force_model).elastic_force(muscle, contraction)
+    }
+
+    /// Static pull in N of the chosen model.
+    pub fn force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
+        self.chosen(muscle.force_model).force(muscle, gauge_pressure, contraction)
+    }
+}

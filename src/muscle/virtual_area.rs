@@ -1,0 +1,41 @@
+use super::{ForceModel, Muscle};
+
+crate::variables! {
+    /// Virtual-area model: the muscle as a cylinder whose piston shrinks as it shortens.
+    ///
+    /// # Model
+    /// F = p A(x) + b(x), with A(x) = a₀ + a₁ x and b(x) = b₀ + b₁ x + b₂ x² + b₃ x³;
+    /// x is the contraction, aᵢ are `area_i`, bᵢ are `elastic_i`.
+    ///
+    /// # Validity
+    /// Identified at 0.5–4.5 bar, 100–800 N, up to 22 cm (6.8 cm for the short muscle); below 0.5 bar it
+    /// predicts force where the real muscle has none yet.
+    ///
+    /// # Reference
+    /// Thesis eqs. 4.5–4.11. Defaults are those of DMSP-40-1000, eqs. 4.6 and 4.8.
+    pub struct VirtualArea in "virtual_area." as Tunable {
+        /// Virtual area at rest
+        area_0: f64 = 0.0091, SQUARE_METRE, (1e-6..=1.0);
+        /// Change of the virtual area with contraction
+        area_1: f64 = -0.0266, METRE, (-10.0..=0.0);
+        /// Elastic force at rest
+        elastic_0: f64 = -113.29, NEWTON, (-1e5..=1e5);
+        /// Elastic force, linear in contraction
+        elastic_1: f64 = -8808.9, NEWTON_PER_METRE, (-1e7..=1e7);
+        /// Elastic force, quadratic in contraction
+        elastic_2: f64 = 5.2111e4, NEWTON_PER_METRE2, (-1e9..=1e9);
+        /// Elastic force, cubic in contraction
+        elastic_3: f64 = -1.0067e5, NEWTON_PER_METRE3, (-1e11..=1e11);
+    }
+}
+
+impl ForceModel for VirtualArea {
+    fn virtual_area(&self, _muscle: &Muscle, contraction: f64) -> f64 {
+        self.area_0 + self.area_1 * contraction
+    }
+
+    fn elastic_force(&self, _muscle: &Muscle, contraction: f64) -> f64 {
+        let x = contraction;
+        self.elastic_0 + x * (self.elastic_1 + x * (self.elastic_2 + x * self.elastic_3))
+    }
+}

@@ -1,0 +1,267 @@
+//! All parameters in one place: their defaults, presets, and the TOML file that people edit.
+
+use crate::controller::{Controller, FeedForward};
+use crate::effects::Effects;
+use crate::load::{Initial, Load};
+use crate::muscle::{ForceModelName, ForceModels, Muscle};
+use crate::reference::Reference;
+use crate::valve::Valve;
+use crate::variables::{Declared, Kind, Variable};
+use crate::{Error, Result};
+use std::fmt::Write;
+
+macro_rules! groups {
+    ($($(#[$attribute:meta])* $field:ident: $Group:ty,)*) => {
+        /// Every parameter of every model. The defaults are the muscle DMSP-40-1000 of the thesis.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct Parameters { $($(#[$attribute])* pub $field: $Group,)* }
+
+        impl Declared for Parameters {
+            fn visit(&self, see: &mut dyn FnMut(&'static Variable, f64)) {
+                $(self.$field.visit(see);)*
+            }
+            fn visit_mut(&mut self, change: &mut dyn FnMut(&'static Variable, f64) -> f64) {
+                $(self.$field.visit_mut(change);)*
+            }
+        }
+    };
+}
+
+groups! {
+    /// Geometry, damping and force model of the muscle.
+    muscle: Muscle,
+    /// Coefficients of the force models.
+    force_models: ForceModels,
+    /// Valve.
+    valve: Valve,
+    /// Hanging load.
+    load: Load,
+    /// Where a simulation starts.
+    initial: Initial,
+    /// PID controller.
+    controller: Controller,
+    /// Feed-forward of the controller.
+    feed_forward: FeedForward,
+    /// Reference trajectory.
+    reference: Reference,
+    /// What a real plant adds to the nominal one.
+    effects: Effects,
+}
+
+/// A named set of parameters, as the difference from the defaults.
+struct Preset {
+    name: &'static str,
+    description: &'static str,
+    toml: &'static str,
+}
+
+const PRESETS: &[Preset] = &[
+    Preset {
+        name: "dmsp-40-1000",
+        description: "FESTO DMSP-40, 1 m: coefficients of the thesis",
+        toml: "",
+    },
+    Preset {
+        name: "dmsp-40-290",
+        description: "FESTO DMSP-40, 29 cm: coefficients of the thesis",
+        toml: include_str!("../presets/dmsp-40-290.toml"),
+    },
+];
+
+/// The controller as the thesis prints it; a variant of every preset.
+const THESIS_CONTROLLER: &str = include_str!("../presets/thesis.toml");
+
+/// Names of all presets and their variants, each with a line on what it is.
+pub fn presets() -> Vec<(String, String)> {
+    let mut all = Vec::new();
+    for preset in PRESETS {
+        all.push((preset.name.to_owned(), preset.description.to_owned()));
+        for model in ForceModelName::CHOICES {
+            all.push((format!("{}/{}", preset.name, model.name), format!("force model: {}", model.description)));
+        }
+        all.push((format!("{}/thesis", preset.name), "controller with the printed gains and structure".to_owned()));
+    }
+    all
+}
+
+impl Parameters {
+    /// The parameters of a preset such as `dmsp-40-1000` or `dmsp-40-290/improved-mckibben`.
+    ///
+    /// # Errors
+    /// [`Error::UnknownPreset`] for any other name.
+    pub fn preset(name: &str) -> Result<Self> {
+        let unknown = || Error::UnknownPreset {
+            name: name.to_owned(),
+            known: PRESETS.iter().map(|p| p.name).collect::<Vec<_>>().join(", "),
+        };
+        let mut parts = name.split('/');
+        let base = parts.next().and_then(|base| PRESETS.iter().find(|p| p.name == base)).ok_or_else(unknown)?;
+        let mut parameters = Self::default();
+        parameters.apply_toml(base.toml, base.name)?;
+        for variant in parts {
+            match variant {
+                "thesis" => parameters.apply_toml(THESIS_CONTROLLER, "thesis")?,
+                model if ForceModelName::CHOICES.iter().any(|c| c.name == model) => {
+                    parameters.set_text("muscle.force_model", model)?;
+                }
+                _ => return Err(unknown()),
+            }
+        }
+        Ok(parameters)
+    }
+
+    /// Changes parameters by a TOML text; a top-level `preset = "NAME"` says what the text starts from.
+    ///
+    /// # Errors
+    /// [`Error::Toml`] with the line for a text that is not TOML; [`Error::ParameterFile`] for a name, kind or value
+    /// that does not fit. The parameters are then unchanged.
+    pub fn apply_toml(&mut self, text: &str, source_name: &str) -> Result<()> {
+        let table: toml::Table = toml::from_str(text).map_err(|error| Error::Toml {
+            source_name: source_name.to_owned(),
+            line: error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count()),
+            problem: error.message().to_owned(),
+        })?;
+        let in_file = |problem| Error::ParameterFile { source_name: source_name.to_owned(), problem: Box::new(problem) };
+        let mut changed = match table.get("preset") {
+            Some(toml::Value::String(name)) => Self::preset(name).map_err(in_file)?,
+            _ => *self,
+        };
+        for (key, value) in &table {
+            if key != "preset" {
+                changed.apply_value(key, value).map_err(in_file)?;
+            }
+        }
+        *self = changed;
+        Ok(())
+    }
+
+    fn apply_value(&mut self, name: &str, value: &toml::Value) -> Result<()> {
+        match value {
+            toml::Value::Table(table) => {
+                table.iter().try_for_each(|(key, value)| self.apply_value(&format!("{name}.{key}"), value))
+            }
+            toml::Value::Float(number) => self.set(name, *number),
+            // TOML integers are 64 bit; the ones people write here are exact in a double.
+            #[allow(clippy::cast_precision_loss)]
+            toml::Value::Integer(number) => self.set(name, *number as f64),
+            toml::Value::String(text) => self.set_text(name, text),
+            other => Err(Error::WrongKind {
+                name: name.to_owned(),
+                expected: "a number or a name".to_owned(),
+                found: other.type_str().to_owned(),
+            }),
+        }
+    }
+
+    /// Value of a parameter by its full name; an enumeration gives its number.
+    ///
+    /// # Errors
+    /// [`Error::UnknownParameter`].
+    pub fn get(&self, name: &str) -> Result<f64> {
+        let mut found = None;
+        self.visit(&mut |variable, value| {
+            if variable.name == name {
+                found = Some(value);
+            }
+        });
+        found.ok_or_else(|| Error::UnknownParameter { name: name.to_owned() })
+    }
+
+    /// Sets a parameter by its full name.
+    ///
+    /// # Errors
+    /// [`Error::UnknownParameter`], [`Error::OutOfRange`].
+    pub fn set(&mut self, name: &str, value: f64) -> Result<()> {
+        let mut outcome = Err(Error::UnknownParameter { name: name.to_owned() });
+        self.visit_mut(&mut |variable, old| {
+            if variable.name != name {
+                return old;
+            }
+            outcome = variable.check(value);
+            if outcome.is_ok() { value } else { old }
+        });
+        outcome
+    }
+
+    fn set_text(&mut self, name: &str, text: &str) -> Result<()> {
+        let mut choices = None;
+        self.visit(&mut |variable, _| {
+            if variable.name == name {
+                choices = Some(variable.kind);
+            }
+        });
+        let wrong = |expected| Error::WrongKind { name: name.to_owned(), expected, found: text.to_owned() };
+        match choices {
+            None => Err(Error::UnknownParameter { name: name.to_owned() }),
+            Some(Kind::Real) => Err(wrong("a number".to_owned())),
+            Some(Kind::Enumeration(_, choices)) => {
+                let names: Vec<_> = choices.iter().map(|choice| choice.name).collect();
+                let position = names.iter().position(|known| *known == text);
+                let position = position.ok_or_else(|| wrong(format!("one of {}", names.join(", "))))?;
+                self.set(name, (position + 1) as f64)
+            }
+        }
+    }
+
+    /// The parameters as a TOML file with units and descriptions; [`Parameters::apply_toml`] reads it back exactly.
+    pub fn to_toml(&self) -> String {
+        let mut text = String::new();
+        let mut table = "";
+        self.visit(&mut |variable, value| {
+            let (group, key) = variable.name.split_once('.').unwrap_or(("", variable.name));
+            if group != table {
+                let _ = writeln!(text, "{}[{group}]", if table.is_empty() { "" } else { "\n" });
+                table = group;
+            }
+            let written = match variable.kind {
+                Kind::Real => format!("{value:?}"),
+                Kind::Enumeration(_, choices) => format!("{:?}", choices[value as usize - 1].name),
+            };
+            let _ = writeln!(text, "{key} = {written}  # {}: {}", variable.unit.symbol, variable.description);
+        });
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_written_file_reads_back_exactly() {
+        let mut parameters = Parameters::preset("dmsp-40-290/improved-mckibben/thesis").unwrap();
+        parameters.set("friction_hysteresis.half_width", 41.234_567_890_123_4).unwrap();
+        let mut read = Parameters::default();
+        read.apply_toml(&parameters.to_toml(), "test").unwrap();
+        assert_eq!(read, parameters);
+    }
+
+    #[test]
+    fn every_preset_loads() {
+        for (name, _) in presets() {
+            Parameters::preset(&name).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_bad_file_changes_nothing_and_says_what_is_wrong() {
+        for (text, expected) in [
+            ("[load]\nmass = 30\nmas = 4.0", "f.toml: there is no parameter `load.mas`; `sinew list variables` shows all"),
+            ("[load]\nmass = nan", "f.toml: `load.mass` is NaN kg, allowed is 0.001 to 100000 kg"),
+            ("[load]\nmass = -3", "f.toml: `load.mass` is -3 kg, allowed is 0.001 to 100000 kg"),
+            (
+                "[muscle]\nforce_model = \"x\"",
+                "f.toml: `muscle.force_model` takes one of virtual-area, improved-mckibben, not `x`",
+            ),
+            ("[load]\nmass = \"x\"", "f.toml: `load.mass` takes a number, not `x`"),
+            ("[load]\nmass = true", "f.toml: `load.mass` takes a number or a name, not `boolean`"),
+        ] {
+            let mut parameters = Parameters::default();
+            let message = parameters.apply_toml(text, "f.toml").unwrap_err().to_string();
+            assert_eq!(message, expected);
+            assert_eq!(parameters, Parameters::default());
+        }
+        let message = Parameters::default().apply_toml("[load]\n\nmass = = 3", "f.toml").unwrap_err().to_string();
+        assert!(message.starts_with("f.toml: line 3: "), "{message}");
+    }
+}
