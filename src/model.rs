@@ -327,7 +327,7 @@ impl<S: Registered> Model for Simulator<S> {
         let name = interface.variables[position].declaration.name;
         let mut found = 0.0;
         self.parameters.visit(&mut |variable, value| {
-            if std::ptr::eq(variable.name, name) {
+            if variable.name == name {
                 found = value;
             }
         });
@@ -340,7 +340,7 @@ impl<S: Registered> Model for Simulator<S> {
             return self.inputs.set(position, value);
         }
         let name = interface.variables[position].declaration.name;
-        self.parameters.visit_mut(&mut |variable, old| if std::ptr::eq(variable.name, name) { value } else { old });
+        self.parameters.visit_mut(&mut |variable, old| if variable.name == name { value } else { old });
     }
 
     fn set_slope(&mut self, position: usize, slope: f64) {

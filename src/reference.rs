@@ -43,6 +43,9 @@ impl Reference {
     pub fn at(&self, time: f64) -> Setpoint {
         let (way, cruise) = self.way_and_cruise_velocity();
         let (a, duration, since) = (self.acceleration, self.duration(), time - self.start_time);
+        if since >= duration {
+            return Setpoint { setpoint: self.target, ..Setpoint::default() };
+        }
         let ramp = cruise / a;
         let (position, velocity, acceleration) = if since < 0.0 {
             (0.0, 0.0, 0.0)
@@ -50,11 +53,9 @@ impl Reference {
             (0.5 * a * since * since, a * since, a)
         } else if since < duration - ramp {
             (cruise * (since - 0.5 * ramp), cruise, 0.0)
-        } else if since < duration {
+        } else {
             let left = duration - since;
             (way - 0.5 * a * left * left, a * left, -a)
-        } else {
-            (way, 0.0, 0.0)
         };
         let direction = (self.target - self.start).signum();
         Setpoint {
