@@ -1,7 +1,7 @@
 //! PID controller with feed-forward.
 
 use crate::Result;
-use crate::model::{Feedthrough, System};
+use crate::model::{Documentation, Feedthrough, System};
 use crate::parameters::Parameters;
 use crate::GRAVITY;
 
@@ -116,6 +116,16 @@ pub struct PidFeedForward;
 impl System for PidFeedForward {
     const NAME: &'static str = "PidFeedForward";
     const DESCRIPTION: &'static str = "PID controller of the contraction with feed-forward of the muscle's forces";
+    const DOCUMENTATION: Documentation = Documentation {
+        equation: "e = setpoint - measured_contraction\n\
+                   command = feed_forward + proportional_gain e + integral_gain int(e) + derivative_gain de/dt, limited\n\
+                   p = (mass (9.81 m/s2 + inertia setpoint_acceleration) - elastic(setpoint)) / area(setpoint)\n\
+                   feed_forward = (p + valve_lag / bandwidth dp/dt) / gain\n\n\
+                   de/dt goes through a first-order filter; the integral stops while the command is at a limit and \
+                   starts such that the first command asks for initial.gauge_pressure.",
+        limits: "The feed-forward knows the muscle as well as its parameters do: give both FMUs the same ones.",
+        source: "Thesis eqs. 5.4 to 5.7 and section 5.3. Filter, limits, inertia and valve inversion are additions.",
+    };
     const GROUPS: &'static [&'static str] =
         &["muscle", "virtual_area", "improved_mckibben", "valve", "load", "initial", "controller", "feed_forward"];
     const FEEDTHROUGH: &'static [Feedthrough] = &[

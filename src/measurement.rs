@@ -1,1 +1,336 @@
-//! todo
+//! Recordings: columns of a CSV file in SI units.
+
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What a column of a recording means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[allow(missing_docs)]
+pub enum Signal {
+    Time,
+    Command,
+    GaugePressure,
+    Contraction,
+    Force,
+    LoadMass,
+    SupplyPressure,
+    Diameter,
+    Temperature,
+}
+
+use Signal::{Command, Contraction, Diameter, Force, GaugePressure, LoadMass, SupplyPressure, Temperature, Time};
+
+const PRESSURE: &[(&str, f64)] =
+    &[("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("mbar", 1e2), ("bar", 1e5), ("psi", 6894.757_293_168)];
+const LENGTH: &[(&str, f64)] = &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)];
+
+/// Columns that are understood: name, meaning, and units with their size in SI. The first unit is SI.
+const COLUMNS: &[(&str, Signal, &[(&str, f64)])] = &[
+    ("time", Time, &[("s", 1.0), ("ms", 1e-3)]),
+    ("command", Command, &[("V", 1.0), ("mV", 1e-3)]),
+    ("gauge_pressure", GaugePressure, PRESSURE),
+    ("contraction", Contraction, LENGTH),
+    ("force", Force, &[("N", 1.0), ("kN", 1e3)]),
+    ("load_mass", LoadMass, &[("kg", 1.0)]),
+    ("supply_pressure", SupplyPressure, PRESSURE),
+    ("diameter", Diameter, LENGTH),
+    ("temperature", Temperature, &[("K", 1.0), ("degC", 1.0)]),
+];
+
+impl Signal {
+    /// Name of the column.
+    pub fn name(self) -> &'static str {
+        COLUMNS.iter().find(|(_, signal, _)| *signal == self).map_or("", |(name, ..)| name)
+    }
+
+    /// Unit in SI.
+    pub fn unit(self) -> &'static str {
+        COLUMNS.iter().find(|(_, signal, _)| *signal == self).map_or("", |(.., units)| units[0].0)
+    }
+}
+
+/// What was measured in one experiment.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// Time in s, strictly increasing, shape `(n_samples,)`.
+    pub time: Vec<f64>,
+    /// The other signals in SI units, each of shape `(n_samples,)`; NaN where a sample is missing.
+    signals: BTreeMap<Signal, Vec<f64>>,
+    /// What a person should know about how the file was read.
+    pub notes: Vec<String>,
+}
+
+/// Fewest samples that are worth looking at.
+const FEWEST_SAMPLES: usize = 10;
+
+impl Recording {
+    /// Reads a CSV file. `renamed` holds pairs of a header as the file has it and the name it stands for here.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Csv`] with line and column for what cannot be understood; [`Error::Recording`] where
+    /// signals are missing that every use needs.
+    pub fn read(path: &Path, renamed: &[(String, String)]) -> Result<Self> {
+        let text = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        Self::parse(&text, path, renamed)
+    }
+
+    /// As [`Recording::read`], of a text at hand; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`Recording::read`].
+    pub fn parse(text: &[u8], path: &Path, renamed: &[(String, String)]) -> Result<Self> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
+        let headers = reader.headers().map_err(|error| csv_error(path, &error))?.clone();
+        let mut notes = Vec::new();
+        let columns = headers
+            .iter()
+            .map(|header| understand(header, path, renamed, &mut notes))
+            .collect::<Result<Vec<Option<Column>>>>()?;
+        let mut signals: BTreeMap<Signal, Vec<f64>> = BTreeMap::new();
+        for column in columns.iter().flatten() {
+            if signals.insert(column.signal, Vec::new()).is_some() {
+                let problem = "there are two such columns: rename or remove one".to_owned();
+                return Err(column.error(path, 1, problem));
+            }
+        }
+        for row in reader.records() {
+            let row = row.map_err(|error| csv_error(path, &error))?;
+            let line = row.position().map_or(0, csv::Position::line);
+            for (cell, column) in row.iter().zip(&columns) {
+                if let Some(column) = column {
+                    let value = column.value(cell, path, line)?;
+                    signals.entry(column.signal).or_default().push(value);
+                }
+            }
+            check_time(path, line, signals.get(&Time))?;
+        }
+        Self { path: path.to_owned(), time: signals.remove(&Time).unwrap_or_default(), signals, notes }.checked()
+    }
+
+    /// Refuses what no use could be made of, and drops rows without a new time.
+    fn checked(mut self) -> Result<Self> {
+        let fresh: Vec<bool> = (0..self.time.len()).map(|k| k == 0 || self.time[k] > self.time[k - 1]).collect();
+        let repeated = fresh.iter().filter(|fresh| !**fresh).count();
+        if repeated > 0 {
+            self.notes.push(format!("{repeated} rows repeat the time of the row before and were left out"));
+            for values in self.signals.values_mut().chain([&mut self.time]) {
+                let mut keep = fresh.iter();
+                values.retain(|_| *keep.next().unwrap_or(&true));
+            }
+        }
+        let problem = |problem: &str| Error::Recording { path: self.path.clone(), problem: problem.to_owned() };
+        if self.time.len() < FEWEST_SAMPLES {
+            return Err(problem("fewer than 10 samples: record longer, or check the separator (a comma is needed)"));
+        }
+        if let Some(masses) = self.signals.get(&LoadMass) {
+            let mut present = masses.iter().copied().filter(|mass| !mass.is_nan());
+            let first = present.next().ok_or_else(|| problem("column `load_mass` is empty"))?;
+            if first <= 0.0 {
+                return Err(problem(&format!("column `load_mass` is {first} kg; a hanging load is heavier than nothing")));
+            }
+            if present.any(|mass| mass != first) {
+                return Err(problem("column `load_mass` changes: split the file into one recording per load"));
+            }
+        }
+        let missing = |signal: Signal| self.get(signal).is_none_or(|values| values.iter().all(|v| v.is_nan()));
+        let complaint = if self.load_mass().is_some() {
+            if missing(Command) {
+                Some("a hanging load (`load_mass`) needs the column `command [V]`")
+            } else if missing(GaugePressure) && missing(Contraction) && missing(Force) {
+                Some("none of `gauge_pressure`, `contraction`, `force` was measured: there is nothing to compare with")
+            } else {
+                None
+            }
+        } else if missing(Contraction) {
+            Some("without `load_mass` the motion is prescribed and the column `contraction [m]` is needed")
+        } else if missing(Command) && missing(GaugePressure) {
+            Some("without `load_mass` either `command [V]` or `gauge_pressure [Pa]` is needed")
+        } else {
+            None
+        };
+        complaint.map_or(Ok(()), |text| Err(problem(text)))?;
+        Ok(self)
+    }
+
+    /// A signal in SI units, NaN where a sample is missing; `None` where there is no such column.
+    pub fn get(&self, signal: Signal) -> Option<&[f64]> {
+        self.signals.get(&signal).map(Vec::as_slice)
+    }
+
+    /// A signal with its gaps bridged by straight lines, for use as an input.
+    pub fn bridged(&self, signal: Signal) -> Option<Vec<f64>> {
+        let values = self.get(signal)?;
+        let known: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).collect();
+        let (first, last) = (*known.first()?, *known.last()?);
+        let mut bridged = values.to_vec();
+        bridged[..first].fill(values[first]);
+        bridged[last..].fill(values[last]);
+        for pair in known.windows(2) {
+            let (a, b) = (pair[0], pair[1]);
+            for k in a + 1..b {
+                let share = (self.time[k] - self.time[a]) / (self.time[b] - self.time[a]);
+                bridged[k] = values[a] + share * (values[b] - values[a]);
+            }
+        }
+        Some(bridged)
+    }
+
+    /// Hanging load in kg; `None` where the motion is prescribed.
+    pub fn load_mass(&self) -> Option<f64> {
+        self.get(LoadMass)?.iter().copied().find(|mass| !mass.is_nan())
+    }
+
+    /// File name without its folder, for people.
+    pub fn name(&self) -> String {
+        self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned()
+    }
+}
+
+/// A column that is understood.
+struct Column {
+    header: String,
+    signal: Signal,
+    scale: f64,
+    offset: f64,
+}
+
+impl Column {
+    fn error(&self, path: &Path, line: u64, problem: String) -> Error {
+        Error::Csv { path: path.to_owned(), line, column: Some(self.header.clone()), problem }
+    }
+
+    /// The value of a cell in SI; NaN where it is empty.
+    fn value(&self, cell: &str, path: &Path, line: u64) -> Result<f64> {
+        if cell.is_empty() || cell.eq_ignore_ascii_case("nan") {
+            return Ok(f64::NAN);
+        }
+        match cell.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number * self.scale + self.offset),
+            _ => Err(self.error(path, line, format!("`{cell}` is not a number; leave the cell empty if it is missing"))),
+        }
+    }
+}
+
+/// What a header means; `None` for a column that is of no use here.
+fn understand(
+    header: &str,
+    path: &Path,
+    renamed: &[(String, String)],
+    notes: &mut Vec<String>,
+) -> Result<Option<Column>> {
+    let header = header.trim_start_matches('\u{feff}');
+    let ours = renamed.iter().find(|(theirs, _)| theirs == header).map_or(header, |(_, ours)| ours);
+    let (name, unit) = match ours.split_once('[') {
+        Some((name, rest)) => (name.trim(), Some(rest.trim_end().trim_end_matches(']').trim())),
+        None => (ours.trim(), None),
+    };
+    let Some((_, signal, units)) = COLUMNS.iter().find(|(known, ..)| *known == name) else {
+        notes.push(format!("column `{header}` is not used"));
+        return Ok(None);
+    };
+    let known = units.iter().map(|(symbol, _)| *symbol).collect::<Vec<_>>().join(", ");
+    let fail = |problem| Error::Csv { path: path.to_owned(), line: 1, column: Some(header.to_owned()), problem };
+    let unit = unit.ok_or_else(|| fail(format!("the header has no unit: write `{name} [{}]`", units[0].0)))?;
+    let scale = units.iter().find(|(symbol, _)| *symbol == unit).map(|(_, scale)| *scale);
+    let scale = scale.ok_or_else(|| fail(format!("unit `{unit}` is unknown: use one of {known}")))?;
+    let offset = if unit == "degC" { 273.15 } else { 0.0 };
+    Ok(Some(Column { header: header.to_owned(), signal: *signal, scale, offset }))
+}
+
+fn check_time(path: &Path, line: u64, time: Option<&Vec<f64>>) -> Result<()> {
+    let fail = |problem: String| {
+        Err(Error::Csv { path: path.to_owned(), line, column: Some("time".to_owned()), problem })
+    };
+    match time.map(Vec::as_slice) {
+        None => fail("there is no column `time [s]`".to_owned()),
+        Some([.., last]) if last.is_nan() => fail("the time is missing: remove the row".to_owned()),
+        Some([.., before, last]) if last < before => {
+            fail(format!("time runs backwards, from {before} s to {last} s: sort the rows or split the file"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn csv_error(path: &Path, error: &csv::Error) -> Error {
+    let line = error.position().map_or(1, csv::Position::line);
+    let problem = match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("{len} cells where the header has {expected_len}: the file is cut off or a separator is missing")
+        }
+        csv::ErrorKind::Utf8 { .. } => "not UTF-8 text".to_owned(),
+        _ => "not a CSV file".to_owned(),
+    };
+    Error::Csv { path: path.to_owned(), line, column: None, problem }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(header: &str, row: impl Fn(usize) -> String) -> String {
+        (0..12).fold(format!("{header}\n"), |text, k| text + &row(k) + "\n")
+    }
+
+    fn parse(text: &str) -> Result<Recording> {
+        Recording::parse(text.as_bytes(), Path::new("r.csv"), &[])
+    }
+
+    const HEADER: &str = "time [ms],command [mV],gauge_pressure [bar],contraction [mm],load_mass [kg],remark";
+
+    #[test]
+    fn units_become_si_and_gaps_are_missing() {
+        let text = rows(HEADER, |k| {
+            let pressure = if k == 3 { String::new() } else { k.to_string() };
+            format!("{},{},{pressure},{},20,x", 10 * k, 1000 * k, 2 * k)
+        });
+        let recording = parse(&text).unwrap();
+        assert!((recording.time[5] - 0.05).abs() < 1e-15);
+        assert_eq!(recording.get(Command).unwrap()[5], 5.0);
+        assert!(recording.get(GaugePressure).unwrap()[3].is_nan());
+        assert_eq!(recording.bridged(GaugePressure).unwrap()[3], 3e5);
+        assert!((recording.get(Contraction).unwrap()[4] - 0.008).abs() < 1e-15);
+        assert_eq!(recording.load_mass(), Some(20.0));
+        assert_eq!(recording.notes, ["column `remark` is not used"]);
+    }
+
+    #[test]
+    fn foreign_headers_can_be_renamed() {
+        let text = rows("t,u,x", |k| format!("{k},1,0.1"));
+        let map = [("t", "time [s]"), ("u", "command [V]"), ("x", "contraction [m]")]
+            .map(|(theirs, ours)| (theirs.to_owned(), ours.to_owned()));
+        assert!(Recording::parse(text.as_bytes(), Path::new("r.csv"), &map).unwrap().notes.is_empty());
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_line_and_column() {
+        let row = |k: usize| format!("{k},1,0.1,20");
+        let header = "time [s],command [V],contraction [m],load_mass [kg]";
+        let cases = [
+            (rows(header, |k| if k == 4 { "4,1".into() } else { row(k) }), "r.csv: line 6: 2 cells where"),
+            (rows("time,command [V],contraction [m],load_mass [kg]", row), "r.csv: line 1, column `time`: the header has"),
+            (
+                rows("time [s],command [volt],contraction [m],load_mass [kg]", row),
+                "r.csv: line 1, column `command [volt]`: unit `volt` is unknown: use one of V, mV",
+            ),
+            (rows(header, |k| row(if k == 7 { 2 } else { k })), "r.csv: line 9, column `time`: time runs backwards, from 6"),
+            (rows(header, |k| if k == 2 { "2,abc,1,20".into() } else { row(k) }), "r.csv: line 4, column `command [V]`: `abc`"),
+            (rows(header, |k| format!("{k},1,0.1,-5")), "r.csv: column `load_mass` is -5 kg"),
+            (rows(header, |k| format!("{k},1,0.1,{}", 20 + k)), "r.csv: column `load_mass` changes"),
+            (rows("time [s],command [V]", |k| format!("{k},1")), "r.csv: without `load_mass` the motion is prescribed"),
+            ("time [s],command [V]\n".to_owned(), "r.csv: fewer than 10 samples"),
+        ];
+        for (text, expected) in cases {
+            let message = parse(&text).unwrap_err().to_string();
+            assert!(message.starts_with(expected), "{message} should start with {expected}");
+        }
+    }
+
+    #[test]
+    fn repeated_times_are_left_out_with_a_note() {
+        let text = rows("time [s],command [V],contraction [m]", |k| format!("{},1,0.1", k.max(2)));
+        assert!(matches!(parse(&text), Ok(r) if r.time.len() == 10 && r.notes[0].starts_with("2 rows repeat")));
+    }
+}

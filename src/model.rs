@@ -11,6 +11,17 @@ use crate::{Error, Result};
 /// Output of a model and the inputs that it depends on without delay.
 pub type Feedthrough = (&'static str, &'static [&'static str]);
 
+/// What a user of a model should know.
+#[derive(Debug, Clone, Copy)]
+pub struct Documentation {
+    /// The equations, with the names of the variables.
+    pub equation: &'static str,
+    /// Where the model holds and where it does not.
+    pub limits: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+}
+
 /// State of a system: an array of reals.
 pub trait State: Copy + Send {
     /// All zero.
@@ -61,6 +72,8 @@ pub trait System: Copy + Send + 'static {
     const NAME: &'static str;
     /// One line.
     const DESCRIPTION: &'static str;
+    /// What a user should know.
+    const DOCUMENTATION: Documentation;
     /// The groups of parameters that it uses, by the first part of their names.
     const GROUPS: &'static [&'static str];
     /// Whether it also has the parameters of every effect.
@@ -113,6 +126,8 @@ pub struct Interface {
     pub name: &'static str,
     /// One line.
     pub description: &'static str,
+    /// What a user should know.
+    pub documentation: Documentation,
     /// Inputs, outputs, parameters, in this order; the position is the value reference.
     pub variables: Vec<ModelVariable>,
     /// How many of the variables are inputs.
@@ -140,6 +155,7 @@ impl Interface {
         Self {
             name: S::NAME,
             description: S::DESCRIPTION,
+            documentation: S::DOCUMENTATION,
             variables,
             inputs: inputs.len(),
             outputs: outputs.len(),
@@ -255,8 +271,12 @@ pub trait Model: Send {
     fn parameters(&self) -> &Parameters;
     /// Starts anew with these parameters, as if just made.
     fn reset(&mut self, parameters: &Parameters);
+    /// Sets the clock, for a host that keeps its own; the state stays as it is.
+    fn set_time(&mut self, time: f64);
     /// Value of a variable.
     fn get(&self, position: usize) -> f64;
+    /// Writes all outputs, in order: cheaper than to get one after the other.
+    fn copy_outputs(&self, values: &mut [f64]);
     /// Sets an input or a parameter. The value must have been checked against the declaration.
     fn set(&mut self, position: usize, value: f64);
     /// Sets the derivative of an input, per second, for the next step.
@@ -314,6 +334,15 @@ impl<S: Registered> Model for Simulator<S> {
 
     fn reset(&mut self, parameters: &Parameters) {
         *self = Self::new(*parameters);
+    }
+
+    fn set_time(&mut self, time: f64) {
+        self.time = time;
+    }
+
+    fn copy_outputs(&self, values: &mut [f64]) {
+        let outputs = self.outputs();
+        values.iter_mut().enumerate().for_each(|(position, value)| *value = outputs.get(position));
     }
 
     fn get(&self, position: usize) -> f64 {

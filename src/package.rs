@@ -1,1 +1,202 @@
-//! todo
+//! FMUs as files: description, library, documentation and parameters in a zip whose bytes depend on nothing else.
+
+use crate::effects::Effects;
+use crate::model::{Interface, Model, models};
+use crate::model_description::model_description;
+use crate::parameters::Parameters;
+use crate::variables::{Declared, Kind};
+use crate::{Error, Result};
+use minijinja::context;
+use rayon::prelude::*;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+/// The FMU library for the platform of this binary.
+pub const EMBEDDED_LIBRARY: &[u8] = include_bytes!(env!("SINEW_EMBEDDED_LIBRARY"));
+/// FMI's name for the platform of [`EMBEDDED_LIBRARY`].
+pub const EMBEDDED_PLATFORM: &str = env!("SINEW_EMBEDDED_PLATFORM");
+
+/// Platforms of FMI 2.0 and the extension of a library there.
+const PLATFORMS: &[(&str, &str)] =
+    &[("linux64", "so"), ("linux32", "so"), ("win64", "dll"), ("win32", "dll"), ("darwin64", "dylib")];
+
+/// The FMU library for one platform.
+#[derive(Debug, Clone)]
+pub struct Library {
+    platform: &'static str,
+    extension: &'static str,
+    bytes: Vec<u8>,
+}
+
+impl Library {
+    /// The library inside this binary.
+    ///
+    /// # Errors
+    /// [`Error::Platform`] on a system that FMI 2.0 has no name for.
+    pub fn embedded() -> Result<Self> {
+        Self::new(EMBEDDED_PLATFORM, EMBEDDED_LIBRARY.to_vec())
+    }
+
+    /// A library from `PLATFORM=FILE`.
+    ///
+    /// # Errors
+    /// [`Error::Platform`], [`Error::Io`].
+    pub fn from_argument(argument: &str) -> Result<Self> {
+        let (platform, file) = argument.split_once('=').ok_or(Error::Platform { argument: argument.to_owned() })?;
+        let bytes = std::fs::read(file).map_err(|source| Error::Io { path: file.into(), source })?;
+        Self::new(platform, bytes)
+    }
+
+    fn new(platform: &str, bytes: Vec<u8>) -> Result<Self> {
+        let known = PLATFORMS.iter().find(|(name, _)| *name == platform);
+        let (platform, extension) = *known.ok_or(Error::Platform { argument: platform.to_owned() })?;
+        Ok(Self { platform, extension, bytes })
+    }
+}
+
+/// The embedded library and those given as `PLATFORM=FILE`; a given one takes the place of the embedded one.
+///
+/// # Errors
+/// As [`Library::embedded`] and [`Library::from_argument`].
+pub fn libraries(arguments: &[String]) -> Result<Vec<Library>> {
+    let mut all = vec![Library::embedded()?];
+    for argument in arguments {
+        let library = Library::from_argument(argument)?;
+        all.retain(|other| other.platform != library.platform);
+        all.push(library);
+    }
+    all.sort_by_key(|library| library.platform);
+    Ok(all)
+}
+
+/// The bytes of the FMU of one model.
+pub fn fmu(interface: &Interface, parameters: &Parameters, libraries: &[Library]) -> Vec<u8> {
+    let name = interface.name;
+    let mut files = vec![
+        ("modelDescription.xml".to_owned(), model_description(interface, parameters).into_bytes()),
+        ("model.png".to_owned(), include_bytes!("package/icon.png").to_vec()),
+        ("documentation/index.html".to_owned(), documentation(interface, parameters).into_bytes()),
+        ("documentation/licenses/license.txt".to_owned(), include_bytes!("../LICENSE").to_vec()),
+        ("resources/parameters.toml".to_owned(), parameters.to_toml().into_bytes()),
+    ];
+    for Library { platform, extension, bytes } in libraries {
+        files.push((format!("binaries/{platform}/{name}.{extension}"), bytes.clone()));
+    }
+    zip(&files)
+}
+
+fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
+    let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(4))
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o644);
+    for (name, bytes) in files {
+        let written = writer.start_file(name, options).map(|()| writer.write_all(bytes));
+        written.expect("a new name").expect("memory takes every write");
+    }
+    writer.finish().expect("memory takes every write").into_inner()
+}
+
+/// The page that explains a model: equation, limits, source, variables with their values, effects.
+fn documentation(interface: &Interface, parameters: &Parameters) -> String {
+    let variables: Vec<_> = interface
+        .variables
+        .iter()
+        .map(|variable| {
+            let declaration = variable.declaration;
+            let mut start = None;
+            parameters.visit(&mut |other, value| {
+                if other.name == declaration.name {
+                    start = Some(value);
+                }
+            });
+            let start = start.map(|value| match declaration.kind {
+                Kind::Real => format!("{value}"),
+                Kind::Enumeration(_, choices) => choices[value as usize - 1].name.to_owned(),
+            });
+            context! {
+                name => variable.name,
+                role => format!("{:?}", declaration.role).to_lowercase(),
+                unit => declaration.unit.symbol,
+                description => declaration.description,
+                start,
+                min => declaration.min.is_finite().then_some(declaration.min),
+                max => declaration.max.is_finite().then_some(declaration.max),
+            }
+        })
+        .collect();
+    let effects: Vec<_> = Effects::DESCRIPTIONS
+        .iter()
+        .filter(|effect| interface.variables.iter().any(|v| v.declaration.group() == effect.name))
+        .map(|effect| {
+            context! {
+                name => effect.name, meaning => effect.meaning, equation => effect.equation,
+                signature => effect.signature, reference => effect.reference,
+            }
+        })
+        .collect();
+    let page = context! {
+        name => interface.name,
+        description => interface.description,
+        documentation => context! {
+            equation => interface.documentation.equation,
+            limits => interface.documentation.limits,
+            source => interface.documentation.source,
+        },
+        variables,
+        effects,
+        version => env!("CARGO_PKG_VERSION"),
+    };
+    render("index.html", include_str!("package/index.html"), &page)
+}
+
+/// Fills a template that ships with the program; everything in it is escaped for HTML.
+pub(crate) fn render(name: &str, template: &str, values: &minijinja::Value) -> String {
+    let mut environment = minijinja::Environment::new();
+    environment.add_template(name, template).expect("a template that ships is valid");
+    let template = environment.get_template(name).expect("it was just added");
+    template.render(values).expect("a template that ships renders")
+}
+
+/// Writes the FMUs of all models into a folder and returns their paths.
+///
+/// # Errors
+/// [`Error::Io`]; no FMU is then half-written.
+pub fn export(parameters: &Parameters, libraries: &[Library], folder: &Path) -> Result<Vec<PathBuf>> {
+    let interfaces: Vec<_> = models().iter().map(|model| model.interface()).collect();
+    let files = interfaces
+        .into_par_iter()
+        .map(|interface| (folder.join(format!("{}.fmu", interface.name)), fmu(interface, parameters, libraries)))
+        .collect();
+    write_whole(files)
+}
+
+/// Writes files whole or not at all, making their folders: each is written under another name first and renamed when
+/// all are complete.
+///
+/// # Errors
+/// [`Error::Io`] with the path that could not be written.
+pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>) -> Result<Vec<PathBuf>> {
+    let mut complete = Vec::new();
+    for (path, bytes) in files {
+        let io = |source| Error::Io { path: path.clone(), source };
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        std::fs::create_dir_all(folder).map_err(io)?;
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // the umask narrows it
+        let mut file = builder.tempfile_in(folder).map_err(io)?;
+        file.write_all(&bytes).map_err(io)?;
+        complete.push((path, file));
+    }
+    let mut written = Vec::new();
+    for (path, file) in complete {
+        file.persist(&path).map_err(|error| Error::Io { path: path.clone(), source: error.error })?;
+        written.push(path);
+    }
+    Ok(written)
+}

@@ -110,6 +110,21 @@ impl Parameters {
         Ok(parameters)
     }
 
+    /// The parameters of a preset, or else of a TOML file, which starts from the defaults.
+    ///
+    /// # Errors
+    /// [`Error::UnknownPreset`] where there is neither; otherwise as [`Parameters::apply_toml`].
+    pub fn load(source: &str) -> Result<Self> {
+        let path = std::path::Path::new(source);
+        if !path.is_file() {
+            return Self::preset(source);
+        }
+        let text = std::fs::read_to_string(path).map_err(|error| Error::Io { path: path.to_owned(), source: error })?;
+        let mut parameters = Self::default();
+        parameters.apply_toml(&text, source)?;
+        Ok(parameters)
+    }
+
     /// Changes parameters by a TOML text; a top-level `preset = "NAME"` says what the text starts from.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! The reference trajectory of the contraction.
 
-use crate::model::System;
+use crate::model::{Documentation, System};
 use crate::parameters::Parameters;
 use crate::Result;
 
@@ -90,6 +90,12 @@ pub struct ReferenceTrajectory;
 impl System for ReferenceTrajectory {
     const NAME: &'static str = "ReferenceTrajectory";
     const DESCRIPTION: &'static str = "Reference of the contraction with limited velocity and acceleration";
+    const DOCUMENTATION: Documentation = Documentation {
+        equation: "From start to target with at most velocity and acceleration: accelerate, cruise, decelerate, \
+                   beginning at start_time.",
+        limits: "The acceleration jumps; the setpoint and its velocity do not.",
+        source: "Thesis section 5.4.",
+    };
     const GROUPS: &'static [&'static str] = &["reference"];
     const OWN_GROUP: Option<&'static str> = Some("reference");
     const FEEDTHROUGH: &'static [(&'static str, &'static [&'static str])] = &[];

@@ -1,0 +1,46 @@
+"""Builds the tool and exports its FMUs once for all tests."""
+
+import pytest
+
+from support import MODELS, ROOT, TARGET, Fmu, run, write_parameters
+
+
+@pytest.fixture(scope="session")
+def sinew():
+    """Path of the `sinew` command, freshly built."""
+    run("cargo", "build", "--release", cwd=ROOT)
+    return TARGET / "release" / "sinew"
+
+
+class Exporter:
+    """Exports FMUs, each set of parameters once."""
+
+    def __init__(self, sinew, folder):
+        self.sinew, self.folder, self.fmus = sinew, folder, {}
+
+    def __call__(self, preset="dmsp-40-1000", parameters=None, options=()):
+        """The four FMUs of a preset, changed by parameters, by name."""
+        key = repr((preset, parameters, options))
+        if key not in self.fmus:
+            folder = self.folder / str(len(self.fmus))
+            folder.mkdir()
+            source = write_parameters(folder / "parameters.toml", parameters, preset) if parameters else preset
+            run(self.sinew, "export", "--parameters", source, "--out", folder / "fmus", *options)
+            self.fmus[key] = {model: Fmu(folder / "fmus" / f"{model}.fmu") for model in MODELS}
+        return self.fmus[key]
+
+
+@pytest.fixture(scope="session")
+def export(sinew, tmp_path_factory):
+    return Exporter(sinew, tmp_path_factory.mktemp("exported"))
+
+
+@pytest.fixture(scope="session", params=MODELS)
+def fmu(request, export):
+    """Each FMU of the default preset in turn."""
+    return export()[request.param]
+
+
+@pytest.fixture(scope="session")
+def muscle(export):
+    return export()["PneumaticMuscle"]
