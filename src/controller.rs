@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::model::{Documentation, Feedthrough, System};
 use crate::parameters::Parameters;
+use crate::plant::holding_pressure;
 use crate::GRAVITY;
 
 crate::variables! {
@@ -75,9 +76,8 @@ crate::signals! {
 
 /// Gauge pressure in Pa that holds the load at a setpoint while it accelerates.
 fn reference_pressure(parameters: &Parameters, setpoint: f64, acceleration: f64) -> f64 {
-    let Parameters { muscle, force_models, load, feed_forward, .. } = parameters;
-    let pull = load.mass * (GRAVITY + feed_forward.inertia * acceleration);
-    (pull - force_models.elastic_force(muscle, setpoint)) / force_models.virtual_area(muscle, setpoint)
+    let pull = parameters.load.mass * (GRAVITY + parameters.feed_forward.inertia * acceleration);
+    holding_pressure(parameters, setpoint, pull)
 }
 
 /// Command in V that makes the valve follow the pressure that the reference needs.

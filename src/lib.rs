@@ -16,11 +16,17 @@ pub mod reference;
 pub mod valve;
 
 #[cfg(feature = "tool")]
+pub mod demo;
+#[cfg(feature = "tool")]
 pub mod diagnosis;
+#[cfg(feature = "tool")]
+pub mod least_squares;
 #[cfg(feature = "tool")]
 pub mod measurement;
 #[cfg(feature = "tool")]
 pub mod package;
+#[cfg(feature = "tool")]
+pub mod plot;
 #[cfg(feature = "tool")]
 pub mod simulation;
 

@@ -1,14 +1,17 @@
 //! The `sinew` command: parse, call, print.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
+use sinew::diagnosis::{self, Diagnosis, diagnose, report};
 use sinew::effects::Effects;
-use sinew::measurement::Recording;
 use sinew::model::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
-use sinew::{Error, Result, package};
-use std::path::PathBuf;
+use sinew::measurement::Recording;
+use sinew::simulation::{OUTPUTS, replay};
+use sinew::{Result, demo, package};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -35,6 +38,39 @@ enum Command {
         #[arg(long = "library", value_name = "PLATFORM=FILE")]
         libraries: Vec<String>,
     },
+    /// Replay recorded inputs through the model and compare
+    #[command(after_help = "Example:\n  sinew simulate run1.csv --parameters dmsp-40-1000 --out simulated")]
+    Simulate {
+        #[command(flatten)]
+        recordings: RecordingSource,
+        #[command(flatten)]
+        parameters: ParameterSource,
+        /// Folder for simulated.csv and the plots
+        #[arg(long, default_value = "sinew-simulated")]
+        out: PathBuf,
+    },
+    /// Say what the simulation gets wrong and why, and extend the model
+    #[command(after_help = "Example:\n  sinew diagnose run1.csv run2.csv --out diagnosis\n\n\
+        With several recordings the last is held out from the fits; of a single one, its end.")]
+    Diagnose {
+        #[command(flatten)]
+        recordings: RecordingSource,
+        #[command(flatten)]
+        parameters: ParameterSource,
+        /// Relative error of the nominal coefficients below which nothing is called wrong
+        #[arg(long, default_value_t = diagnosis::DEFAULT_TOLERANCE, value_parser = tolerance)]
+        tolerance: f64,
+        /// Folder for diagnosis.json, report.html, extended.toml, simulated.csv and the extended FMU
+        #[arg(long, default_value = "sinew-diagnosis")]
+        out: PathBuf,
+    },
+    /// Do it all once, on recordings that ship with the program
+    #[command(after_help = "Example:\n  sinew demo --out sinew-demo")]
+    Demo {
+        /// Folder for everything that is made
+        #[arg(long, default_value = "sinew-demo")]
+        out: PathBuf,
+    },
     /// List what there is
     #[command(after_help = "Example:\n  sinew list effects")]
     List {
@@ -54,6 +90,37 @@ impl ParameterSource {
     fn load(&self) -> Result<Parameters> {
         Parameters::load(&self.source)
     }
+}
+
+#[derive(Args)]
+struct RecordingSource {
+    /// Recordings: CSV files with a header `name [unit]` per column
+    #[arg(required = true, value_name = "RECORDING.csv")]
+    files: Vec<PathBuf>,
+    /// Header of a foreign file and what it means here, as in --map "p_mus=gauge_pressure [bar]"
+    #[arg(long = "map", value_name = "THEIRS=OURS", value_parser = renaming)]
+    renamed: Vec<(String, String)>,
+}
+
+impl RecordingSource {
+    fn read(&self) -> Result<Vec<Recording>> {
+        let recordings = report::read_all(&self.files, &self.renamed)?;
+        for recording in &recordings {
+            recording.notes.iter().for_each(|note| eprintln!("note: {}: {note}", recording.name()));
+        }
+        Ok(recordings)
+    }
+}
+
+fn renaming(text: &str) -> std::result::Result<(String, String), String> {
+    let (theirs, ours) = text.split_once('=').ok_or("write THEIRS=OURS, as in \"p_mus=gauge_pressure [bar]\"")?;
+    Ok((theirs.to_owned(), ours.to_owned()))
+}
+
+fn tolerance(text: &str) -> std::result::Result<f64, String> {
+    let value: f64 = text.trim_end_matches('%').trim().parse().map_err(|_| "not a number".to_owned())?;
+    let value = if text.ends_with('%') { value / 100.0 } else { value };
+    if value > 0.0 && value < 1.0 { Ok(value) } else { Err("a share between 0 and 1, such as 0.03 or 3%".to_owned()) }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -88,8 +155,102 @@ fn main() -> ExitCode {
 fn run(command: Command) -> Result<Answer> {
     match command {
         Command::Export { parameters, out, libraries } => export(&parameters.load()?, &out, &libraries),
+        Command::Simulate { recordings, parameters, out } => simulate(&parameters.load()?, &recordings.read()?, &out),
+        Command::Diagnose { recordings, parameters, tolerance, out } => {
+            run_diagnosis(&parameters.load()?, &recordings.read()?, tolerance, &out)
+        }
+        Command::Demo { out } => run_demo(&out),
         Command::List { what } => Ok(list(what)),
     }
+}
+
+/// A bar on stderr that counts finished pieces of work; invisible where stderr is no terminal.
+fn progress(pieces: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}").expect("a valid template");
+    ProgressBar::new(pieces as u64).with_style(style)
+}
+
+fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
+    let mut files = vec![(out.join("simulated.csv"), report::simulated_csv(&[("simulated", parameters)], recordings)?)];
+    let mut rows = Vec::new();
+    for recording in recordings {
+        let stem = Path::new(&recording.name()).with_extension("").display().to_string();
+        for (k, svg) in report::recording_plots(parameters, parameters, recording)?.into_iter().enumerate() {
+            files.push((out.join(format!("{stem}-{}.svg", k + 1)), svg.into_bytes()));
+        }
+        let replay = replay(parameters, recording)?;
+        for signal in OUTPUTS {
+            if let (Some(measured), Some(simulated)) = (recording.get(signal), replay.get(signal)) {
+                rows.push(vec![
+                    ("recording", recording.name()),
+                    ("signal", signal.name().to_owned()),
+                    ("rms", format!("{:.6}", report::rms_difference(measured, simulated))),
+                    ("unit", signal.unit().to_owned()),
+                ]);
+            }
+        }
+    }
+    let files = package::write_whole(files)?;
+    let Answer { text, json } = table(rows);
+    Ok(Answer { text: format!("{text}{}", listed(&files)), json: json!({ "errors": json, "files": files }) })
+}
+
+fn listed(files: &[PathBuf]) -> String {
+    files.iter().map(|path| format!("{}\n", path.display())).collect()
+}
+
+fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {
+    let bar = progress(Effects::DESCRIPTIONS.len() + 1);
+    let found = diagnose(parameters, recordings, tolerance, &|name| {
+        bar.set_message(name.to_owned());
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
+    let files = package::write_whole(files)?;
+    Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), json: report::to_json(&found) })
+}
+
+/// A diagnosis in a few lines.
+fn told(found: &Diagnosis) -> String {
+    let mut text = format!("{}\n", report::headline(found));
+    text += &format!(
+        "Held-out error reduced by {:.0} % ({}).\n",
+        100.0 * found.improvement,
+        found.held_out
+    );
+    for signal in &found.signals {
+        text += &format!(
+            "  {:<15} nominal {:.3e}, extended {:.3e}, noise {:.3e} {}\n",
+            signal.signal.name(),
+            signal.nominal_rms,
+            signal.extended_rms,
+            signal.noise_rms,
+            signal.signal.unit()
+        );
+    }
+    text
+}
+
+fn run_demo(out: &Path) -> Result<Answer> {
+    let bar = progress(Effects::DESCRIPTIONS.len() + 2);
+    let made = demo::run(out, &|name| {
+        bar.set_message(name.to_owned());
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let text = format!(
+        "1. Exported the nominal FMUs to {nominal}.\n\
+         2. Simulated the closed loop: largest control error {error:.2} mm ({out}/closed_loop.svg).\n\
+         3. Replayed two recordings with dry friction hidden in them and fitted every effect.\n\n{told}\n\
+         4. Wrote the extended model and FMU to {diagnosis}.\n\nOpen {diagnosis}/report.html.\n",
+        nominal = out.join("nominal").display(),
+        out = out.display(),
+        error = 1e3 * made.closed_loop.largest_error(),
+        told = told(&made.diagnosis),
+        diagnosis = out.join("diagnosis").display(),
+    );
+    Ok(Answer { text, json: json!({ "files": made.files, "diagnosis": report::to_json(&made.diagnosis) }) })
 }
 
 fn export(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {

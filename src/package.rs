@@ -1,7 +1,7 @@
 //! FMUs as files: description, library, documentation and parameters in a zip whose bytes depend on nothing else.
 
 use crate::effects::Effects;
-use crate::model::{Interface, Model, models};
+use crate::model::{Interface, models};
 use crate::model_description::model_description;
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Kind};

@@ -98,6 +98,12 @@ fn moving_mass(parameters: &Parameters) -> f64 {
     parameters.effects.mass(parameters.load.mass)
 }
 
+/// Gauge pressure in Pa at which a weight in N hangs still at a contraction in m.
+pub fn holding_pressure(parameters: &Parameters, contraction: f64, weight: f64) -> f64 {
+    let Parameters { muscle, force_models, .. } = parameters;
+    (weight - force_models.elastic_force(muscle, contraction)) / force_models.virtual_area(muscle, contraction)
+}
+
 /// Contraction in m at which the muscle holds a weight in N at a gauge pressure in Pa, at rest; `None` where there is
 /// none.
 ///
@@ -264,21 +270,85 @@ impl System for PneumaticActuator {
     }
 
     fn outputs(parameters: &Parameters, _: f64, inputs: &ActuatorInputs, state: &Self::State) -> ActuatorOutputs {
-        let [gauge_pressure, own @ ..] = *state;
-        let ActuatorInputs { contraction, contraction_velocity, .. } = *inputs;
-        let at = Point { gauge_pressure, contraction_velocity };
-        let force = muscle_force(parameters, &at, contraction, &own);
-        let shown = parameters.effects.readings(Readings { contraction, gauge_pressure, force });
-        ActuatorOutputs {
-            force,
-            gauge_pressure,
-            measured_contraction: shown.contraction,
-            measured_gauge_pressure: shown.gauge_pressure,
-            measured_force: shown.force,
-        }
+        let [gauge_pressure, own @ ..] = state;
+        driven_outputs(parameters, *gauge_pressure, inputs.contraction, inputs.contraction_velocity, own)
     }
 
     fn left_range(_: &Parameters, _: &Self::State) -> Option<&'static str> {
         None
+    }
+}
+
+crate::signals! {
+    /// What is known of the muscle when its pressure was measured.
+    pub struct MeasuredInputs as Input {
+        /// Gauge pressure in the muscle
+        gauge_pressure = "muscle.gauge_pressure", PASCAL;
+        /// Rest length minus length
+        contraction = "muscle.contraction", METRE;
+        /// Rate of the contraction
+        contraction_velocity = "muscle.contraction_velocity", METRE_PER_SECOND;
+    }
+}
+
+/// The muscle alone, its pressure and motion given: the chain cut where it was measured. It is no FMU.
+///
+/// # Model
+/// As [`PneumaticActuator`], with the gauge pressure as an input.
+#[derive(Debug, Clone, Copy)]
+pub struct MuscleAlone;
+
+impl System for MuscleAlone {
+    const NAME: &'static str = "MuscleAlone";
+    const DESCRIPTION: &'static str = "Pneumatic artificial muscle, its pressure and motion given";
+    const DOCUMENTATION: Documentation = PneumaticActuator::DOCUMENTATION;
+    const GROUPS: &'static [&'static str] = PneumaticActuator::GROUPS;
+    const EFFECTS: bool = true;
+    const FEEDTHROUGH: &'static [Feedthrough] = &[];
+    const INITIAL_INPUTS: &'static [&'static str] = &[];
+    const STATE_NAMES: &'static [&'static str] = &[];
+    type Inputs = MeasuredInputs;
+    type Outputs = ActuatorOutputs;
+    type State = [f64; Effects::STATES];
+    const SCALE: Self::State = [1.0; Effects::STATES];
+
+    fn initial_state(_: &Parameters, _: &MeasuredInputs) -> Result<Self::State> {
+        Ok([0.0; Effects::STATES])
+    }
+
+    #[inline]
+    fn rates(parameters: &Parameters, inputs: &MeasuredInputs, state: &Self::State, rates: &mut Self::State) {
+        let at =
+            Point { gauge_pressure: inputs.gauge_pressure, contraction_velocity: inputs.contraction_velocity };
+        parameters.effects.rates(&at, state, rates);
+    }
+
+    fn outputs(parameters: &Parameters, _: f64, inputs: &MeasuredInputs, state: &Self::State) -> ActuatorOutputs {
+        let MeasuredInputs { gauge_pressure, contraction, contraction_velocity } = *inputs;
+        driven_outputs(parameters, gauge_pressure, contraction, contraction_velocity, state)
+    }
+
+    fn left_range(_: &Parameters, _: &Self::State) -> Option<&'static str> {
+        None
+    }
+}
+
+/// Outputs of a muscle whose motion is given; `own` are the states of the effects.
+fn driven_outputs(
+    parameters: &Parameters,
+    gauge_pressure: f64,
+    contraction: f64,
+    contraction_velocity: f64,
+    own: &[f64],
+) -> ActuatorOutputs {
+    let at = Point { gauge_pressure, contraction_velocity };
+    let force = muscle_force(parameters, &at, contraction, own);
+    let shown = parameters.effects.readings(Readings { contraction, gauge_pressure, force });
+    ActuatorOutputs {
+        force,
+        gauge_pressure,
+        measured_contraction: shown.contraction,
+        measured_gauge_pressure: shown.gauge_pressure,
+        measured_force: shown.force,
     }
 }

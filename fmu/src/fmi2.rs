@@ -354,7 +354,7 @@ getters! {
     /// See [`Instance::get_real`].
     fmi2GetReal, fmi2Real, Instance::get_real;
     /// See [`Instance::get_integer`].
-    fmi2GetInteger, fmi2Integer, Instance::get_integer;
+    fmi2GetInteger, fmi2Integer, |instance: &mut Instance, vr, values| instance.get_integer(vr, values);
     /// No model has such variables.
     fmi2GetBoolean, fmi2Boolean, |instance: &mut Instance, vr, _| instance.access_none(vr, DataType::Boolean);
     /// No model has such variables.

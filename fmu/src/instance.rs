@@ -4,7 +4,7 @@ use crate::log::{Log, Status};
 use crate::refusal::{DataType, Refusal};
 use crate::resources;
 use crate::snapshot::Snapshot;
-use sinew::model::{Model, ModelVariable, models};
+use sinew::model::{Interface, Model, ModelVariable, models};
 use sinew::model_description;
 use sinew::parameters::Parameters;
 use sinew::variables::{Kind, Role};
@@ -100,6 +100,7 @@ impl Start {
 pub struct Instance {
     guid: &'static str,
     model: Box<dyn Model>,
+    interface: &'static Interface,
     start_parameters: Parameters,
     log: Log,
     phase: Phase,
@@ -115,15 +116,16 @@ impl Instance {
     pub fn new(start: Start, log: Log) -> Self {
         let Start { guid, mut model, parameters } = start;
         model.reset(&parameters);
-        let outputs = vec![0.0; model.interface().outputs];
+        let interface = model.interface();
         Self {
             guid,
             model,
+            interface,
             start_parameters: parameters,
             log,
             phase: Phase::Instantiated,
             stop_time: f64::INFINITY,
-            outputs,
+            outputs: vec![0.0; interface.outputs],
             is_current: false,
         }
     }
@@ -135,16 +137,23 @@ impl Instance {
             true => guarded(|| work(self)),
             false => Err(Refusal::WrongPhase { phase: before }),
         };
-        let status = outcome.as_ref().err().map_or(Status::Ok, Refusal::status);
-        if status == Status::Fatal {
-            self.phase = Phase::Fatal;
-        }
-        if let Err(refusal) = outcome {
-            self.log.write(status, || format!("{function}: {refusal}"));
-        }
+        let status = match outcome {
+            Ok(()) => Status::Ok,
+            Err(refusal) => self.report(function, &refusal),
+        };
         if self.phase != before {
             self.log.write(Status::Ok, || format!("{function}: the instance is now {}", self.phase));
         }
+        status
+    }
+
+    #[cold]
+    fn report(&mut self, function: &str, refusal: &Refusal) -> Status {
+        let status = refusal.status();
+        if status == Status::Fatal {
+            self.phase = Phase::Fatal;
+        }
+        self.log.write(status, || format!("{function}: {refusal}"));
         status
     }
 
@@ -218,8 +227,9 @@ impl Instance {
 
     /// The variable with a value reference, if it is of the type of the call.
     fn variable(&self, value_reference: u32, asked: DataType) -> Result<&'static ModelVariable, Refusal> {
-        let variable = self.model.interface().variables.get(value_reference as usize);
-        let variable = variable.ok_or(Refusal::UnknownVariable { value_reference })?;
+        let Some(variable) = self.interface.variables.get(value_reference as usize) else {
+            return Err(Refusal::UnknownVariable { value_reference });
+        };
         let is = match variable.declaration.kind {
             Kind::Real => DataType::Real,
             Kind::Enumeration(..) => DataType::Integer,
@@ -247,22 +257,22 @@ impl Instance {
         self.real_variable(value_reference, |role| role == Role::Output, "an output")
     }
 
-    fn value(&mut self, value_reference: u32, variable: &ModelVariable) -> Result<f64, Refusal> {
-        let position = value_reference as usize;
-        if variable.declaration.role != Role::Output {
-            return Ok(self.model.get(position));
-        }
-        self.refresh()?;
-        Ok(self.outputs[position - self.model.interface().inputs])
-    }
-
     /// Reads real variables.
     ///
     /// # Errors
     /// [`Refusal::UnknownVariable`], [`Refusal::WrongType`]; those of [`Model::initialize`] in initialization mode.
     pub fn get_real(&mut self, value_references: &[u32], values: &mut [f64]) -> Outcome {
+        let first_output = self.interface.inputs as u32;
         for (&reference, value) in value_references.iter().zip(values) {
-            *value = self.value(reference, self.variable(reference, DataType::Real)?)?;
+            // Outputs, all real, are what hosts read at every step: the short way for them.
+            let output = reference.wrapping_sub(first_output) as usize;
+            *value = if output < self.outputs.len() {
+                self.refresh()?;
+                self.outputs[output]
+            } else {
+                self.variable(reference, DataType::Real)?;
+                self.model.get(reference as usize)
+            };
         }
         Ok(())
     }
@@ -271,9 +281,10 @@ impl Instance {
     ///
     /// # Errors
     /// [`Refusal::UnknownVariable`], [`Refusal::WrongType`].
-    pub fn get_integer(&mut self, value_references: &[u32], values: &mut [i32]) -> Outcome {
+    pub fn get_integer(&self, value_references: &[u32], values: &mut [i32]) -> Outcome {
         for (&reference, value) in value_references.iter().zip(values) {
-            *value = self.value(reference, self.variable(reference, DataType::Integer)?)? as i32;
+            self.variable(reference, DataType::Integer)?;
+            *value = self.model.get(reference as usize) as i32;
         }
         Ok(())
     }

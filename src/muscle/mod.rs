@@ -29,6 +29,10 @@ crate::variables! {
         turns: f64 = 3.5, ONE, (0.05..=100.0);
         /// Viscous damping inside the muscle
         damping: f64 = 80.0, NEWTON_SECOND_PER_METRE, (0.0..=1e5);
+        /// Correction of the virtual area: this muscle against the coefficients
+        area_scale: f64 = 1.0, ONE, (0.1..=10.0);
+        /// Correction of the elastic force: this muscle against the coefficients
+        elastic_scale: f64 = 1.0, ONE, (0.1..=10.0);
     }
 }
 
@@ -56,11 +60,6 @@ pub trait ForceModel {
 
     /// Force in N of the elastic membrane at a contraction in m; negative where it resists shortening.
     fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64;
-
-    /// Static pull in N at a gauge pressure in Pa and a contraction in m.
-    fn force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
-        gauge_pressure * self.virtual_area(muscle, contraction) + self.elastic_force(muscle, contraction)
-    }
 }
 
 macro_rules! force_models {
@@ -121,18 +120,21 @@ force_models! {
 }
 
 impl ForceModels {
-    /// Virtual area in m² of the chosen model.
+    /// Virtual area in m² of the chosen model, with the muscle's correction.
+    #[inline]
     pub fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64 {
-        self.chosen(muscle.force_model).virtual_area(muscle, contraction)
+        muscle.area_scale * self.chosen(muscle.force_model).virtual_area(muscle, contraction)
     }
 
-    /// Elastic force in N of the chosen model.
+    /// Elastic force in N of the chosen model, with the muscle's correction.
+    #[inline]
     pub fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64 {
-        self.chosen(muscle.force_model).elastic_force(muscle, contraction)
+        muscle.elastic_scale * self.chosen(muscle.force_model).elastic_force(muscle, contraction)
     }
 
     /// Static pull in N of the chosen model.
+    #[inline]
     pub fn force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
-        self.chosen(muscle.force_model).force(muscle, gauge_pressure, contraction)
+        gauge_pressure * self.virtual_area(muscle, contraction) + self.elastic_force(muscle, contraction)
     }
 }

@@ -5,10 +5,28 @@ import pytest
 from support import MODELS, ROOT, TARGET, Fmu, run, write_parameters
 
 
+NOTES = pytest.StashKey()
+
+
+@pytest.fixture(scope="session")
+def note(request):
+    """Takes a measured number or table, to be shown when all tests have run."""
+    return request.config.stash.setdefault(NOTES, []).append
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if notes := config.stash.get(NOTES, []):
+        terminalreporter.section("measured")
+        terminalreporter.write("\n".join(notes) + "\n")
+
+
 @pytest.fixture(scope="session")
 def sinew():
     """Path of the `sinew` command, freshly built."""
-    run("cargo", "build", "--release", cwd=ROOT)
+    try:
+        run("cargo", "build", "--release", cwd=ROOT)
+    except AssertionError as problem:
+        pytest.exit(str(problem), returncode=1)  # once, not for each test
     return TARGET / "release" / "sinew"
 
 

@@ -31,13 +31,13 @@ def test_every_reference_has_its_preset():
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_agrees_with_the_independent_solution(export, name):
+def test_agrees_with_the_independent_solution(export, note, name):
     recording = read_csv(REFERENCE / f"{name}.csv")
     with Instance(export(PRESETS[name])["PneumaticMuscle"], start_of(recording)) as instance:
         simulated = follow(instance, recording["time"], recording["command"], SIGNALS)
     measured = np.column_stack([recording[signal.split(".")[1]] for signal in SIGNALS])
     contraction, gauge_pressure, velocity, force = np.abs(simulated - measured).max(axis=0)
-    print(f"{name}: {contraction:.2g} m, {gauge_pressure:.2g} Pa, {velocity:.2g} m/s, {force:.2g} N")
+    note(f"{name}: off by {contraction:.2g} m, {gauge_pressure:.2g} Pa, {velocity:.2g} m/s, {force:.2g} N")
     assert contraction < 1e-6
     assert gauge_pressure < 1.0
     assert velocity < 1e-5

@@ -200,7 +200,7 @@ WRONG_CALLS = {
     "step of zero": (lambda i: i.step(0.0), "step"),
     "step backwards": (lambda i: i.step(-1e-3), "step"),
     "NaN step": (lambda i: i.step(float("nan")), "step"),
-    "wrong communication point": (lambda i: i.slave.doStep(5.0, 1e-3), "communication point"),
+    "wrong communication point": (lambda i: i.slave.doStep(5.0, 1e-3), "5 s"),
     "second derivative of an input": (
         lambda i: i.slave.setRealInputDerivatives(i.fmu.references(["valve.command"]), [2], [1.0]), "order"),
     "derivative of a parameter": (lambda i: i.set_slopes({"load.mass": 1.0}), "load.mass"),

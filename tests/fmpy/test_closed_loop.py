@@ -41,14 +41,14 @@ def largest_error(fmus, valve, mass, velocity):
 
 
 @pytest.mark.parametrize("valve", ["2.5 rad/s", "2.5 Hz"])
-def test_printed_gains_give_the_table(export, valve):
+def test_printed_gains_give_the_table(export, note, valve):
     fmus, rows = export(PRESET), []
     for (of_valve, mass, velocity), expected in reference_errors().items():
         if of_valve == valve:
             rows.append((mass, velocity, expected, largest_error(fmus, valve, mass, velocity)))
-    print(f"\nlargest position error, valve {valve}, printed gains, 1 ms\n  kg    m/s   reference mm   FMUs mm")
+    note(f"largest position error, printed gains, 1 ms, valve {valve}\n  kg    m/s   reference mm   FMUs mm")
     for mass, velocity, expected, found in rows:
-        print(f"{mass:4g} {velocity:6g} {1e3 * expected:14.3f} {1e3 * found:9.3f}")
+        note(f"{mass:4g} {velocity:6g} {1e3 * expected:14.3f} {1e3 * found:9.3f}")
     assert len(rows) == 9
     expected, found = np.array(rows)[:, 2:].T
     assert found == pytest.approx(expected, rel=0.2)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from libcosimpy.CosimEnums import CosimVariableType
 from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
@@ -20,17 +20,25 @@ OUTPUTS = ("muscle.contraction", "muscle.contraction_velocity", "muscle.gauge_pr
            "measured.contraction")
 
 
-@pytest.fixture(scope="session")
-def importer():
-    """The small program in tests/importer, built with the libclang of this Python environment."""
+def cargo(command, *options):
+    """Runs cargo on the small program in tests/importer with the libclang of this Python environment."""
     include = run("gcc", "-print-file-name=include").stdout.strip()  # the wheel of libclang has no headers of its own
     environment = os.environ | {
         "LIBCLANG_PATH": str(Path(sysconfig.get_paths()["purelib"]) / "clang" / "native"),
         "BINDGEN_EXTRA_CLANG_ARGS": f"-I{include}",
         "CARGO_TARGET_DIR": str(TARGET / "importer"),
     }
-    run("cargo", "build", "--locked", cwd=ROOT / "tests" / "importer", env=environment)
+    run("cargo", command, "--locked", *options, cwd=ROOT / "tests" / "importer", env=environment)
+
+
+@pytest.fixture(scope="session")
+def importer():
+    cargo("build")
     return TARGET / "importer" / "debug" / "importer"
+
+
+def test_importer_is_clean():
+    cargo("clippy", "--", "-D", "warnings")
 
 
 def with_fmpy(fmu):
@@ -43,6 +51,7 @@ def with_fmpy(fmu):
 
 
 def with_libcosim(fmu):
+    log_output_level(CosimLogLevel.WARNING)
     execution = CosimExecution.from_step_size(STEP * 1e9)
     slave = execution.add_local_slave(CosimLocalSlave(str(fmu.path), "muscle"))
     observer = CosimObserver.create_last_value()
@@ -65,12 +74,9 @@ def with_rust(fmu, importer):
 
 def test_three_importers_same_numbers(muscle, importer):
     expected = with_fmpy(muscle)
-    nominal = [muscle_nominal(muscle, name) for name in OUTPUTS]
+    nominal = [float(muscle.variables[name].nominal) for name in OUTPUTS]
     assert expected[-1][0] != pytest.approx(expected[0][0], abs=1e-3), "the muscle should move"
     for table in (with_libcosim(muscle), with_rust(muscle, importer)):
         assert table.shape == expected.shape
         assert (np.abs(table - expected).max(axis=0) <= 1e-12 * np.array(nominal)).all()
 
-
-def muscle_nominal(fmu, name):
-    return float(fmu.variables[name].nominal)

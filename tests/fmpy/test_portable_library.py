@@ -34,10 +34,10 @@ def needed_libraries(path):
         return {tag.needed for tag in tags if tag.entry.d_tag == "DT_NEEDED"}
 
 
-def test_needs_no_newer_glibc(library):
+def test_needs_no_newer_glibc(library, note):
     versions = [re.fullmatch(r"GLIBC_(\d+)\.(\d+)(\.\d+)?", name) for name in needed_versions(library)]
     versions = [(int(match[1]), int(match[2])) for match in versions if match]
-    print("newest symbol needed: glibc {}.{}".format(*max(versions)))
+    note("portable library: newest symbol needed is of glibc {}.{}".format(*max(versions)))
     assert max(versions) <= OLDEST_GLIBC
 
 
@@ -46,8 +46,8 @@ def test_needs_only_the_c_library(library):
                                          "librt.so.1", "ld-linux-x86-64.so.2"}
 
 
-def test_is_small(library):
-    print(f"{library.stat().st_size / 2**20:.2f} MiB")
+def test_is_small(library, note):
+    note(f"portable library: {library.stat().st_size / 2**20:.2f} MiB")
     assert library.stat().st_size < 2 * 2**20
 
 

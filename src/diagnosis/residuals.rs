@@ -1,0 +1,237 @@
+//! Residuals of a model against recordings: how large they are allowed to be, and which of them no fit sees.
+
+use crate::measurement::{Recording, Signal};
+use crate::parameters::Parameters;
+use crate::simulation::{OUTPUTS, Replay, replay};
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Share of each recording, from its start, that fits see when there is only one.
+const TRAINING_SHARE: f64 = 0.6;
+/// Structural error of a nominal model beyond its coefficients, as a share of the declared tolerance and of the span of
+/// the signal: a polynomial is never quite the muscle.
+const STRUCTURE_SHARE: f64 = 0.2;
+/// Length of a block in s: errors of different blocks count as independent.
+const BLOCK: f64 = 2.0;
+
+/// Recordings with what is needed to judge residuals.
+pub struct Data<'a> {
+    recordings: &'a [Recording],
+    /// Time in s from which a recording is held out.
+    held_out_from: Vec<f64>,
+    noise: BTreeMap<Signal, f64>,
+    /// Residuals of this size are expected of a sound model.
+    scale: BTreeMap<Signal, f64>,
+}
+
+/// Squared, scaled residuals of held-out blocks.
+#[derive(Debug, Clone)]
+pub struct HeldOut {
+    /// Mean square per block, all signals together.
+    pub blocks: Vec<f64>,
+    /// Mean square over everything.
+    pub loss: f64,
+    /// Number of samples that are worth an independent one.
+    pub effective_samples: f64,
+}
+
+impl<'a> Data<'a> {
+    /// Looks at recordings before any fit.
+    ///
+    /// # Errors
+    /// [`Error::Recording`] where no signal was measured that the simulation gives.
+    pub fn new(recordings: &'a [Recording], nominal: &Parameters, tolerance: f64) -> Result<Self> {
+        let mut noise = BTreeMap::new();
+        let mut scale = BTreeMap::new();
+        for signal in OUTPUTS {
+            let mut measured: Vec<&[f64]> = Vec::new();
+            for recording in recordings {
+                let simulated = replay(nominal, recording)?;
+                measured.extend(simulated.get(signal).and(recording.get(signal)));
+            }
+            let measured: Vec<&[f64]> = measured.into_iter().filter(|v| v.iter().any(|x| !x.is_nan())).collect();
+            if measured.is_empty() {
+                continue;
+            }
+            let level = rms(&measured.iter().map(|values| noise_rms(values)).collect::<Vec<_>>());
+            let structure = STRUCTURE_SHARE * tolerance * span(&measured);
+            noise.insert(signal, level);
+            scale.insert(signal, level.hypot(structure));
+        }
+        if scale.is_empty() {
+            return Err(Error::Recording {
+                path: recordings[0].path.clone(),
+                problem: "no signal was measured that the simulation gives; add `force`, `contraction` or \
+                          `gauge_pressure`"
+                    .to_owned(),
+            });
+        }
+        Ok(Self { recordings, held_out_from: split(recordings), noise, scale })
+    }
+
+    /// The signals that can be compared.
+    pub fn signals(&self) -> Vec<Signal> {
+        self.scale.keys().copied().collect()
+    }
+
+    /// Rms noise of a signal's sensor, SI.
+    pub fn noise(&self, signal: Signal) -> f64 {
+        self.noise[&signal]
+    }
+
+    /// What is held out, in words.
+    pub fn held_out(&self) -> String {
+        let parts = self.recordings.iter().zip(&self.held_out_from).filter(|(r, from)| r.time.last() > Some(from));
+        let words = parts.map(|(recording, from)| {
+            if *from <= recording.time[0] { recording.name() } else { format!("{} from {from:.1} s", recording.name()) }
+        });
+        words.collect::<Vec<_>>().join(", ")
+    }
+
+    /// Scaled residuals of the samples that fits may see; `None` where the model cannot be simulated.
+    pub fn training_residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+        let replays = self.replays(parameters)?;
+        let mut all = Vec::new();
+        for (index, replay) in replays.iter().enumerate() {
+            self.each_residual(index, replay, |_, time, scaled| {
+                if time < self.held_out_from[index] {
+                    all.push(scaled);
+                }
+            });
+        }
+        Some(all)
+    }
+
+    /// Number of training samples per independent one, from the autocorrelation of a model's residuals.
+    pub fn samples_per_independent(&self, parameters: &Parameters) -> f64 {
+        let residuals = self.training_residuals(parameters).unwrap_or_default();
+        let rho = autocorrelation(&residuals);
+        (1.0 + rho) / (1.0 - rho)
+    }
+
+    /// Squared residuals of the samples that no fit saw; `None` where the model cannot be simulated.
+    pub fn held_out_loss(&self, parameters: &Parameters) -> Option<HeldOut> {
+        let replays = self.replays(parameters)?;
+        let mut blocks: BTreeMap<(usize, u64), (f64, usize)> = BTreeMap::new();
+        let mut series = Vec::new();
+        for (index, replay) in replays.iter().enumerate() {
+            self.each_residual(index, replay, |_, time, scaled| {
+                if time >= self.held_out_from[index] {
+                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                    let block = ((time - self.held_out_from[index].max(self.recordings[index].time[0])) / BLOCK) as u64;
+                    let entry = blocks.entry((index, block)).or_default();
+                    *entry = (entry.0 + scaled * scaled, entry.1 + 1);
+                    series.push(scaled);
+                }
+            });
+        }
+        let rho = autocorrelation(&series);
+        Some(HeldOut {
+            blocks: blocks.values().map(|(sum, count)| sum / *count as f64).collect(),
+            loss: series.iter().map(|r| r * r).sum::<f64>() / series.len() as f64,
+            effective_samples: series.len() as f64 * (1.0 - rho) / (1.0 + rho),
+        })
+    }
+
+    /// Rms of each signal's residual on the samples that no fit saw, SI; `None` where the model cannot be simulated.
+    pub fn held_out_rms(&self, parameters: &Parameters) -> Option<BTreeMap<Signal, f64>> {
+        let replays = self.replays(parameters)?;
+        let mut sums: BTreeMap<Signal, (f64, usize)> = self.signals().into_iter().map(|s| (s, (0.0, 0))).collect();
+        for (index, replay) in replays.iter().enumerate() {
+            self.each_residual(index, replay, |signal, time, scaled| {
+                if time >= self.held_out_from[index] {
+                    let entry = sums.entry(signal).or_default();
+                    *entry = (entry.0 + scaled * scaled, entry.1 + 1);
+                }
+            });
+        }
+        Some(sums.into_iter().map(|(s, (sum, n))| (s, self.scale[&s] * (sum / n.max(1) as f64).sqrt())).collect())
+    }
+
+    fn replays(&self, parameters: &Parameters) -> Option<Vec<Replay>> {
+        self.recordings.par_iter().map(|recording| replay(parameters, recording).ok()).collect()
+    }
+
+    /// Every residual of a recording: signal, time in s, measured − simulated relative to its scale.
+    fn each_residual(&self, index: usize, replay: &Replay, mut see: impl FnMut(Signal, f64, f64)) {
+        let recording = &self.recordings[index];
+        for (signal, scale) in &self.scale {
+            if let (Some(measured), Some(simulated)) = (recording.get(*signal), replay.get(*signal)) {
+                for (k, time) in recording.time.iter().enumerate() {
+                    let residual = measured[k] - simulated[k];
+                    if residual.is_finite() {
+                        see(*signal, *time, residual / scale);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Where the held-out part of each recording starts: the last of several recordings, else the end of the only one.
+fn split(recordings: &[Recording]) -> Vec<f64> {
+    if let [only] = recordings {
+        let (first, last) = (only.time[0], only.time[only.time.len() - 1]);
+        return vec![first + TRAINING_SHARE * (last - first)];
+    }
+    let mut from = vec![f64::INFINITY; recordings.len()];
+    if let Some(last) = from.last_mut() {
+        *last = f64::NEG_INFINITY;
+    }
+    from
+}
+
+/// Rms noise of a sensor: the scatter about straight lines through neighbouring samples, robust against real motion,
+/// and at least the noise of rounding to the steps that the values show.
+pub fn noise_rms(values: &[f64]) -> f64 {
+    let present: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
+    let mut bends: Vec<f64> = present.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    let mut steps: Vec<f64> = present.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0).collect();
+    bends.sort_by(f64::total_cmp);
+    steps.sort_by(f64::total_cmp);
+    let median = bends.get(bends.len() / 2).copied().unwrap_or(0.0);
+    let quantum = steps.first().copied().unwrap_or(0.0);
+    // 1.4826 makes a median deviation a standard deviation; the bend of white noise has √6 of it.
+    let scatter = 1.4826 * median / 6.0_f64.sqrt();
+    scatter.max(quantum / 12.0_f64.sqrt()).max(f64::MIN_POSITIVE)
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+fn span(all: &[&[f64]]) -> f64 {
+    let values = || all.iter().flat_map(|values| values.iter().copied()).filter(|v| !v.is_nan());
+    values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+}
+
+/// Correlation of neighbours, within what leaves an effective sample size.
+fn autocorrelation(series: &[f64]) -> f64 {
+    let power: f64 = series.iter().map(|r| r * r).sum();
+    let together: f64 = series.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    if power > 0.0 { (together / power).clamp(0.0, 0.999) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_told_from_motion() {
+        // A slow sine of amplitude 1 with an alternating, therefore noise-like, part of 1e-3 rms.
+        let values: Vec<f64> = (0..4000)
+            .map(|k| {
+                let wiggle = f64::from((k * 7919 % 2003) - 1001) / 1001.0 * 3.0_f64.sqrt() * 1e-3;
+                (f64::from(k) * 0.002).sin() + wiggle
+            })
+            .collect();
+        let estimate = noise_rms(&values);
+        assert!((0.7e-3..1.4e-3).contains(&estimate), "{estimate}");
+    }
+
+    #[test]
+    fn a_constant_signal_has_hardly_any_noise() {
+        assert!(noise_rms(&[1.0; 50]) < 1e-300);
+    }
+}
