@@ -1,10 +1,10 @@
 //! PID controller with feed-forward.
 
+use crate::GRAVITY;
 use crate::Result;
 use crate::model::{Documentation, Feedthrough, System};
 use crate::parameters::Parameters;
 use crate::plant::holding_pressure;
-use crate::GRAVITY;
 
 crate::variables! {
     /// PID controller of the contraction.

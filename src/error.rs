@@ -19,6 +19,14 @@ pub enum Error {
         /// Unit of all three.
         unit: &'static str,
     },
+    /// A value that is no number, for a variable that takes any.
+    #[error("`{variable}` is {value}; it must be a finite number")]
+    NotFinite {
+        /// Full name of the variable.
+        variable: String,
+        /// The value that was refused.
+        value: f64,
+    },
     /// A name that no variable carries.
     #[error("there is no parameter `{name}`; `sinew list variables` shows all")]
     UnknownParameter {
@@ -73,9 +81,9 @@ pub enum Error {
         gauge_pressure: f64,
     },
     /// The simulation left the range in which the model means anything.
-    #[error("the simulation diverged at {time} s: `{variable}` is no longer meaningful")]
+    #[error("the simulation diverged by {time} s: `{variable}` left the range in which the model holds")]
     Diverged {
-        /// Simulated time, s.
+        /// Simulated time at which it was noticed, s.
         time: f64,
         /// The first state that left its range.
         variable: &'static str,

@@ -13,6 +13,8 @@
 pub const TOLERANCE: f64 = 1e-8;
 const LARGEST_STEP: f64 = 0.05;
 const SMALLEST_STEP: f64 = 1e-9;
+/// A call that needs more steps than this would keep its caller waiting for seconds: the parameters make no sense.
+const MOST_STEPS: usize = 10_000_000;
 
 /// Coefficients of the stages (Butcher tableau), without the first row.
 const A: [&[f64]; 6] = [
@@ -29,7 +31,7 @@ const C: [f64; 6] = [1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
-/// Integration left the range of numbers, or no step was small enough.
+/// Integration left the range of numbers, no step was small enough, or there were too many.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Failed {
     /// Time since the start of the interval, s.
@@ -44,7 +46,8 @@ pub struct Failed {
 /// each state; `step` is the step proposed by the last call and is updated.
 ///
 /// # Errors
-/// [`Failed`] when a state is not finite or the step would fall below a nanosecond; `state` is then meaningless.
+/// [`Failed`] when a state is not finite, the step would fall below a nanosecond, or the steps are too many; `state` is
+/// then meaningless.
 #[inline]
 pub fn advance<const N: usize>(
     rates: impl Fn(f64, &[f64; N], &mut [f64; N]),
@@ -56,7 +59,7 @@ pub fn advance<const N: usize>(
     let mut time = 0.0;
     let mut stages = [[0.0; N]; 7];
     rates(0.0, state, &mut stages[0]);
-    loop {
+    for _ in 0..MOST_STEPS {
         let rest = duration - time;
         // A rest that is hardly longer than the step is done in one, not in one and a sliver.
         let last = rest <= *step * 1.000_001;
@@ -80,6 +83,7 @@ pub fn advance<const N: usize>(
             return Err(Failed { after: time, state: worst });
         }
     }
+    Err(Failed { after: time, state: 0 })
 }
 
 #[inline]
@@ -122,4 +126,41 @@ fn scaled_error<const N: usize>(
         }
     }
     (largest, worst)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Oscillator with known solution, and a state that decays.
+    fn rates(_: f64, y: &[f64; 3], dy: &mut [f64; 3]) {
+        *dy = [y[1], -100.0 * y[0], -3.0 * y[2]];
+    }
+
+    #[test]
+    fn closed_form_is_met_whatever_the_calls() {
+        for call in [1e-4, 1e-3, 1e-2, 0.25, 1.0] {
+            let (mut state, mut step) = ([1.0, 0.0, 1.0], 1e-3);
+            for _ in 0..(1.0_f64 / call).round() as usize {
+                advance(rates, &[1.0, 10.0, 1.0], &mut state, &mut step, call).unwrap();
+            }
+            let exact = [10.0_f64.cos(), -10.0 * 10.0_f64.sin(), (-3.0_f64).exp()];
+            for (is, should) in state.iter().zip(exact) {
+                assert!((is - should).abs() < 1e-6, "{call}: {is} {should}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_explosion_is_reported_with_its_time() {
+        let explode = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = y[0] * y[0];
+        let failed = advance(explode, &[1.0], &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
+        assert!((failed.after - 1.0).abs() < 1e-3, "1/(1 - t) ends at 1 s, not {}", failed.after);
+    }
+
+    #[test]
+    fn a_stiffness_without_sense_ends() {
+        let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e12 * y[0];
+        assert!(advance(stiff, &[1.0], &mut [1.0], &mut 1e-3, 1.0).is_err());
+    }
 }

@@ -56,7 +56,12 @@ const SMALL_DECREASE: f64 = 1e-6;
 pub fn fit(residuals: &(impl Fn(&[f64]) -> Option<Vec<f64>> + Sync), free: &[Free]) -> Fit {
     let mut parameters: Vec<f64> = free.iter().map(|f| f.start.clamp(f.lower, f.upper)).collect();
     let Some(mut current) = residuals(&parameters) else {
-        return Fit { parameters, cost: f64::INFINITY, variances: vec![f64::INFINITY; free.len()], ended: Ended::NoStart };
+        return Fit {
+            parameters,
+            cost: f64::INFINITY,
+            variances: vec![f64::INFINITY; free.len()],
+            ended: Ended::NoStart,
+        };
     };
     let mut damping = 1e-3;
     let mut ended = Ended::IterationLimit;
@@ -119,13 +124,7 @@ fn normal_equations(
     (normal, DVector::from_fn(free.len(), |i, _| dot(&columns[i], current)))
 }
 
-fn step(
-    normal: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    free: &[Free],
-    parameters: &[f64],
-    damping: f64,
-) -> Vec<f64> {
+fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, free: &[Free], parameters: &[f64], damping: f64) -> Vec<f64> {
     let pushes_out = |k: usize| {
         (parameters[k] <= free[k].lower && gradient[k] > 0.0) || (parameters[k] >= free[k].upper && gradient[k] < 0.0)
     };

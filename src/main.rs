@@ -5,12 +5,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use sinew::diagnosis::{self, Diagnosis, diagnose, report};
 use sinew::effects::Effects;
+use sinew::measurement::Recording;
 use sinew::model::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
-use sinew::measurement::Recording;
 use sinew::simulation::{OUTPUTS, replay};
 use sinew::{Result, demo, package};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -142,7 +143,8 @@ fn main() -> ExitCode {
     match run(cli.command) {
         Ok(answer) => {
             let output = if cli.json { format!("{:#}", answer.json) } else { answer.text };
-            println!("{}", output.trim_end());
+            // Whoever stops reading early, as `head` does, has all that was wanted.
+            let _ = writeln!(std::io::stdout(), "{}", output.trim_end());
             ExitCode::SUCCESS
         }
         Err(error) => {
@@ -214,11 +216,7 @@ fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f
 /// A diagnosis in a few lines.
 fn told(found: &Diagnosis) -> String {
     let mut text = format!("{}\n", report::headline(found));
-    text += &format!(
-        "Held-out error reduced by {:.0} % ({}).\n",
-        100.0 * found.improvement,
-        found.held_out
-    );
+    text += &format!("Held-out error reduced by {:.0} % ({}).\n", 100.0 * found.improvement, found.held_out);
     for signal in &found.signals {
         text += &format!(
             "  {:<15} nominal {:.3e}, extended {:.3e}, noise {:.3e} {}\n",
@@ -281,7 +279,10 @@ fn list(what: Listing) -> Answer {
                 .collect(),
         ),
         Listing::Presets => table(
-            presets().into_iter().map(|(name, description)| vec![("name", name), ("description", description)]).collect(),
+            presets()
+                .into_iter()
+                .map(|(name, description)| vec![("name", name), ("description", description)])
+                .collect(),
         ),
         Listing::Effects => list_effects(),
         Listing::Variables => list_variables(),

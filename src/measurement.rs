@@ -129,7 +129,9 @@ impl Recording {
             let mut present = masses.iter().copied().filter(|mass| !mass.is_nan());
             let first = present.next().ok_or_else(|| problem("column `load_mass` is empty"))?;
             if first <= 0.0 {
-                return Err(problem(&format!("column `load_mass` is {first} kg; a hanging load is heavier than nothing")));
+                return Err(problem(&format!(
+                    "column `load_mass` is {first} kg; a hanging load is heavier than nothing"
+                )));
             }
             if present.any(|mass| mass != first) {
                 return Err(problem("column `load_mass` changes: split the file into one recording per load"));
@@ -209,7 +211,9 @@ impl Column {
         }
         match cell.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number * self.scale + self.offset),
-            _ => Err(self.error(path, line, format!("`{cell}` is not a number; leave the cell empty if it is missing"))),
+            _ => {
+                Err(self.error(path, line, format!("`{cell}` is not a number; leave the cell empty if it is missing")))
+            }
         }
     }
 }
@@ -241,9 +245,8 @@ fn understand(
 }
 
 fn check_time(path: &Path, line: u64, time: Option<&Vec<f64>>) -> Result<()> {
-    let fail = |problem: String| {
-        Err(Error::Csv { path: path.to_owned(), line, column: Some("time".to_owned()), problem })
-    };
+    let fail =
+        |problem: String| Err(Error::Csv { path: path.to_owned(), line, column: Some("time".to_owned()), problem });
     match time.map(Vec::as_slice) {
         None => fail("there is no column `time [s]`".to_owned()),
         Some([.., last]) if last.is_nan() => fail("the time is missing: remove the row".to_owned()),
@@ -310,13 +313,22 @@ mod tests {
         let header = "time [s],command [V],contraction [m],load_mass [kg]";
         let cases = [
             (rows(header, |k| if k == 4 { "4,1".into() } else { row(k) }), "r.csv: line 6: 2 cells where"),
-            (rows("time,command [V],contraction [m],load_mass [kg]", row), "r.csv: line 1, column `time`: the header has"),
+            (
+                rows("time,command [V],contraction [m],load_mass [kg]", row),
+                "r.csv: line 1, column `time`: the header has",
+            ),
             (
                 rows("time [s],command [volt],contraction [m],load_mass [kg]", row),
                 "r.csv: line 1, column `command [volt]`: unit `volt` is unknown: use one of V, mV",
             ),
-            (rows(header, |k| row(if k == 7 { 2 } else { k })), "r.csv: line 9, column `time`: time runs backwards, from 6"),
-            (rows(header, |k| if k == 2 { "2,abc,1,20".into() } else { row(k) }), "r.csv: line 4, column `command [V]`: `abc`"),
+            (
+                rows(header, |k| row(if k == 7 { 2 } else { k })),
+                "r.csv: line 9, column `time`: time runs backwards, from 6",
+            ),
+            (
+                rows(header, |k| if k == 2 { "2,abc,1,20".into() } else { row(k) }),
+                "r.csv: line 4, column `command [V]`: `abc`",
+            ),
             (rows(header, |k| format!("{k},1,0.1,-5")), "r.csv: column `load_mass` is -5 kg"),
             (rows(header, |k| format!("{k},1,0.1,{}", 20 + k)), "r.csv: column `load_mass` changes"),
             (rows("time [s],command [V]", |k| format!("{k},1")), "r.csv: without `load_mass` the motion is prescribed"),

@@ -148,7 +148,11 @@ fn write_types(xml: &mut Xml, interface: &Interface) -> io::Result<()> {
                     element_with(xml, "Enumeration", |xml| {
                         choices.iter().zip(1..).try_for_each(|(choice, value)| {
                             let (name, text) = (choice.name.to_owned(), choice.description.to_owned());
-                            element(xml, "Item", vec![("name", name), ("value", value.to_string()), ("description", text)])
+                            element(
+                                xml,
+                                "Item",
+                                vec![("name", name), ("value", value.to_string()), ("description", text)],
+                            )
                         })
                     })
                 })?;

@@ -56,11 +56,7 @@ struct Preset {
 }
 
 const PRESETS: &[Preset] = &[
-    Preset {
-        name: "dmsp-40-1000",
-        description: "FESTO DMSP-40, 1 m: coefficients of the thesis",
-        toml: "",
-    },
+    Preset { name: "dmsp-40-1000", description: "FESTO DMSP-40, 1 m: coefficients of the thesis", toml: "" },
     Preset {
         name: "dmsp-40-290",
         description: "FESTO DMSP-40, 29 cm: coefficients of the thesis",
@@ -136,7 +132,8 @@ impl Parameters {
             line: error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count()),
             problem: error.message().to_owned(),
         })?;
-        let in_file = |problem| Error::ParameterFile { source_name: source_name.to_owned(), problem: Box::new(problem) };
+        let in_file =
+            |problem| Error::ParameterFile { source_name: source_name.to_owned(), problem: Box::new(problem) };
         let mut changed = match table.get("preset") {
             Some(toml::Value::String(name)) => Self::preset(name).map_err(in_file)?,
             _ => *self,
@@ -261,7 +258,10 @@ mod tests {
     #[test]
     fn a_bad_file_changes_nothing_and_says_what_is_wrong() {
         for (text, expected) in [
-            ("[load]\nmass = 30\nmas = 4.0", "f.toml: there is no parameter `load.mas`; `sinew list variables` shows all"),
+            (
+                "[load]\nmass = 30\nmas = 4.0",
+                "f.toml: there is no parameter `load.mas`; `sinew list variables` shows all",
+            ),
             ("[load]\nmass = nan", "f.toml: `load.mass` is NaN kg, allowed is 0.001 to 100000 kg"),
             ("[load]\nmass = -3", "f.toml: `load.mass` is -3 kg, allowed is 0.001 to 100000 kg"),
             (

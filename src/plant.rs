@@ -318,8 +318,7 @@ impl System for MuscleAlone {
 
     #[inline]
     fn rates(parameters: &Parameters, inputs: &MeasuredInputs, state: &Self::State, rates: &mut Self::State) {
-        let at =
-            Point { gauge_pressure: inputs.gauge_pressure, contraction_velocity: inputs.contraction_velocity };
+        let at = Point { gauge_pressure: inputs.gauge_pressure, contraction_velocity: inputs.contraction_velocity };
         parameters.effects.rates(&at, state, rates);
     }
 

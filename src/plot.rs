@@ -16,7 +16,8 @@ pub struct Curve<'a> {
 }
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito) and in print.
-const PALETTE: [RGBColor; 4] = [RGBColor(40, 40, 40), RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115)];
+const PALETTE: [RGBColor; 4] =
+    [RGBColor(40, 40, 40), RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115)];
 /// More points than this per curve are not seen.
 const MOST_POINTS: usize = 1200;
 
@@ -31,13 +32,15 @@ type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 fn draw(svg: &mut String, title: &str, x_label: &str, y_label: &str, curves: &[Curve]) -> Drawn {
     let area = SVGBackend::with_string(svg, (760, 340)).into_drawing_area();
-    let range = |pick: fn(&Curve) -> Vec<f64>| padded(curves.iter().flat_map(pick));
+    let range = |pick: fn(&Curve) -> Vec<f64>, above: f64| padded(curves.iter().flat_map(pick), above);
+    // Room for the legend, so that it hides nothing.
+    let above = if curves.len() > 1 { 0.1 + 0.09 * curves.len() as f64 } else { 0.05 };
     let mut chart = ChartBuilder::on(&area)
         .caption(title, ("sans-serif", 17))
         .margin(10)
         .x_label_area_size(38)
         .y_label_area_size(62)
-        .build_cartesian_2d(range(|c| c.x.to_vec()), range(|c| c.y.to_vec()))?;
+        .build_cartesian_2d(range(|c| c.x.to_vec(), 0.02), range(|c| c.y.to_vec(), above))?;
     chart
         .configure_mesh()
         .light_line_style(WHITE)
@@ -49,7 +52,8 @@ fn draw(svg: &mut String, title: &str, x_label: &str, y_label: &str, curves: &[C
         .draw()?;
     for curve in curves {
         let color = PALETTE[curve.color % PALETTE.len()];
-        let drawn = chart.draw_series(pieces(curve).into_iter().map(|piece| PathElement::new(piece, color.stroke_width(1))))?;
+        let drawn =
+            chart.draw_series(pieces(curve).into_iter().map(|piece| PathElement::new(piece, color.stroke_width(1))))?;
         drawn.label(curve.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(3)));
     }
     if curves.len() > 1 {
@@ -63,16 +67,16 @@ fn draw(svg: &mut String, title: &str, x_label: &str, y_label: &str, curves: &[C
     area.present()
 }
 
-/// Range of finite values with a little room around it.
-fn padded(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+/// Range of finite values with a little room below and the given share of room above.
+fn padded(values: impl Iterator<Item = f64>, above: f64) -> std::ops::Range<f64> {
     let (low, high) = values
         .filter(|value| value.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if low > high {
         return 0.0..1.0;
     }
-    let room = 0.05 * (high - low).max(1e-9 * high.abs().max(1.0));
-    low - room..high + room
+    let size = (high - low).max(1e-9 * high.abs().max(1.0));
+    low - 0.02 * size..high + above * size
 }
 
 /// The unbroken pieces of a curve, thinned where it has more points than can be seen.

@@ -1,8 +1,8 @@
 //! The reference trajectory of the contraction.
 
+use crate::Result;
 use crate::model::{Documentation, System};
 use crate::parameters::Parameters;
-use crate::Result;
 
 crate::variables! {
     /// From one contraction to another with limited velocity and acceleration.

@@ -67,8 +67,11 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
     let Some(command) = command else { return replay_muscle(&parameters, recording) };
     let contraction = recording.bridged(Signal::Contraction).unwrap_or_default();
     let velocity = slopes(time, &contraction);
-    let inputs =
-        |k: usize| ActuatorInputs { command: command[k], contraction: contraction[k], contraction_velocity: velocity[k] };
+    let inputs = |k: usize| ActuatorInputs {
+        command: command[k],
+        contraction: contraction[k],
+        contraction_velocity: velocity[k],
+    };
     follow::<PneumaticActuator>(&parameters, time, inputs, driven_readings, &[Signal::Contraction])
 }
 

@@ -3,8 +3,6 @@
 //! [`variables!`](crate::variables) turns one list of fields into the struct, its defaults, and the table from which
 //! the FMU description, the parameter file, the bounds of a fit and the documentation follow.
 
-use std::ops::RangeInclusive;
-
 /// A unit as FMI wants it: a symbol and exponents of the base units.
 #[derive(Debug, PartialEq)]
 pub struct Unit {
@@ -114,11 +112,15 @@ impl Variable {
     /// Checks a value against this declaration.
     ///
     /// # Errors
-    /// [`crate::Error::OutOfRange`] when the value is not finite, below `min` or above `max`.
+    /// [`crate::Error::OutOfRange`] when the value is not finite, below `min` or above `max`;
+    /// [`crate::Error::NotFinite`] where there are no such bounds.
     pub fn check(&self, value: f64) -> crate::Result<()> {
         let whole = matches!(self.kind, Kind::Real) || value.fract() == 0.0;
         if value.is_finite() && whole && (self.min..=self.max).contains(&value) {
             return Ok(());
+        }
+        if self.min == f64::NEG_INFINITY && self.max == f64::INFINITY {
+            return Err(crate::Error::NotFinite { variable: self.name.to_owned(), value });
         }
         Err(crate::Error::OutOfRange {
             variable: self.name.to_owned(),
@@ -169,9 +171,6 @@ pub trait Signals: Declared + Copy + Default + Send {
     /// `self + slope * span`, field by field.
     fn along(&self, slope: &Self, span: f64) -> Self;
 }
-
-/// Any real number.
-pub const ANY: RangeInclusive<f64> = f64::NEG_INFINITY..=f64::INFINITY;
 
 /// Start, unit and range of every field of a group: `name: type = start, UNIT, min..=max;`.
 #[macro_export]

@@ -1,13 +1,13 @@
 //! The diagnosis as files: `diagnosis.json`, `report.html`, `extended.toml`, `simulated.csv` and the extended FMU.
 
 use super::{Diagnosis, FittedParameter, Verdict};
+use crate::Result;
 use crate::measurement::{Recording, Signal};
 use crate::model::models;
 use crate::package::{Library, fmu, render};
 use crate::parameters::Parameters;
 use crate::plot::{Curve, plot};
 use crate::simulation::{OUTPUTS, replay, replay_muscle};
-use crate::Result;
 use minijinja::context;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -128,7 +128,8 @@ pub fn recording_plots(nominal: &Parameters, extended: &Parameters, recording: &
     let name = recording.name();
     let mut plots = Vec::new();
     for signal in OUTPUTS {
-        let (Some(measured), Some(before), Some(after)) = (recording.get(signal), before.get(signal), after.get(signal))
+        let (Some(measured), Some(before), Some(after)) =
+            (recording.get(signal), before.get(signal), after.get(signal))
         else {
             continue;
         };

@@ -219,11 +219,13 @@ mod tests {
 
     #[test]
     fn noise_is_told_from_motion() {
-        // A slow sine of amplitude 1 with an alternating, therefore noise-like, part of 1e-3 rms.
+        // A slow sine of amplitude 1 with uniform noise of 1e-3 rms from a linear congruential generator.
+        let mut seed = 1_u32;
         let values: Vec<f64> = (0..4000)
             .map(|k| {
-                let wiggle = f64::from((k * 7919 % 2003) - 1001) / 1001.0 * 3.0_f64.sqrt() * 1e-3;
-                (f64::from(k) * 0.002).sin() + wiggle
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let noise = (f64::from(seed) / f64::from(u32::MAX) - 0.5) * 12.0_f64.sqrt() * 1e-3;
+                (f64::from(k) * 0.002).sin() + noise
             })
             .collect();
         let estimate = noise_rms(&values);

@@ -56,7 +56,8 @@ pub fn select(baseline: &Fitted, candidates: Vec<Fitted>) -> Chosen {
     }
     let Some((best, loss, evidence)) = judged.first() else { return none(Verdict::Unexplained, ranking) };
     let explained = (without.loss - loss) / (without.loss - 1.0);
-    let beyond_doubt = best.held_out.as_ref().is_some_and(|held_out| block_score(without, held_out) > LEAST_BLOCK_SCORE);
+    let beyond_doubt =
+        best.held_out.as_ref().is_some_and(|held_out| block_score(without, held_out) > LEAST_BLOCK_SCORE);
     if *evidence < LEAST_EVIDENCE || explained < LEAST_EXPLAINED || !beyond_doubt {
         return none(Verdict::Unexplained, ranking);
     }
@@ -79,7 +80,8 @@ fn evidence(without: &HeldOut, with: &HeldOut, parameters: usize) -> f64 {
 
 /// Mean logarithmic gain over blocks, in its standard errors.
 fn block_score(without: &HeldOut, with: &HeldOut) -> f64 {
-    let gains: Vec<f64> = without.blocks.iter().zip(&with.blocks).map(|(before, after)| (before / after).ln()).collect();
+    let gains: Vec<f64> =
+        without.blocks.iter().zip(&with.blocks).map(|(before, after)| (before / after).ln()).collect();
     let count = gains.len() as f64;
     let mean = gains.iter().sum::<f64>() / count;
     let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);

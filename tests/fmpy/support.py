@@ -4,6 +4,7 @@ import csv
 import os
 import subprocess
 import sys
+import tempfile
 from ctypes import byref
 from functools import cached_property
 from pathlib import Path
@@ -61,7 +62,9 @@ class Fmu:
 
     @cached_property
     def folder(self):
-        return fmpy.extract(str(self.path), unzipdir=str(self.path.with_suffix("")))
+        """Where it is unpacked: a new place each time, because a loaded library must not be written over."""
+        self._temporary = tempfile.TemporaryDirectory()
+        return fmpy.extract(str(self.path), unzipdir=self._temporary.name)
 
     def names(self, causality):
         return [name for name, variable in self.variables.items() if variable.causality == causality]

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from support import MODELS, run, write_parameters
+from support import MODELS, ROOT, run, write_parameters
 
 HEADER = "time [s],command [V],gauge_pressure [bar],contraction [mm],force [N],load_mass [kg]"
 ROWS = [f"{0.01 * row:.2f},2.0,2.0,100.0,392.4,40" for row in range(50)]
@@ -38,7 +38,6 @@ BAD_RECORDINGS = {
     "header without unit": (dict(header=HEADER.replace("contraction [mm]", "contraction")), ["line 1", "contraction"]),
     "unknown unit": (dict(header=HEADER.replace("[mm]", "[furlong]")), ["line 1", "contraction", "furlong"]),
     "time running backwards": (dict(rows=replaced(20, "0.05,2.0,2.0,100.0,392.4,40")), ["line 22", "time"]),
-    "time standing still": (dict(rows=replaced(20, "0.19,2.0,2.0,100.0,392.4,40")), ["line 22", "time"]),
     "not a number": (dict(rows=replaced(30, "0.30,2.0,2.0,abc,392.4,40")), ["line 32", "contraction", "abc"]),
     "infinite": (dict(rows=replaced(30, "0.30,2.0,inf,100.0,392.4,40")), ["line 32", "gauge_pressure"]),
     "too many cells": (dict(rows=replaced(30, ROWS[30] + ",7")), ["line 32"]),
@@ -60,6 +59,33 @@ def test_bad_recording_is_refused(sinew, tmp_path, command, change, named):
     for fact in [str(path), *named]:
         assert fact in message
     assert not out.exists()
+
+
+def test_repeated_time_is_left_out_and_said(sinew, tmp_path):
+    path = recording(tmp_path / "repeated.csv", rows=replaced(20, "0.19,2.0,2.0,100.0,392.4,40"))
+    done = run(sinew, "simulate", path, "--out", tmp_path / "out")
+    assert "repeated.csv" in done.stderr and "1 row" in done.stderr
+    assert len((tmp_path / "out" / "simulated.csv").read_text().splitlines()) == 1 + 49
+
+
+def test_simulation_says_how_far_off_it_is(sinew, tmp_path):
+    done = run(sinew, "simulate", ROOT / "data" / "nominal_40kg.csv", "--out", tmp_path, "--json")
+    answer = json.loads(done.stdout)
+    errors = {error["signal"]: error["rms"] for error in answer["errors"]}
+    assert errors.keys() == {"gauge_pressure", "contraction", "force"}
+    assert 0.0 < errors["gauge_pressure"] < 1e3 and 0.0 < errors["contraction"] < 3e-3 and 0.0 < errors["force"] < 10.0
+    assert sorted(str(path) for path in tmp_path.iterdir()) == sorted(answer["files"])
+
+
+def test_diagnosis_of_next_to_nothing_stays_finite(sinew, tmp_path):
+    """Half a second at rest without any noise: a refusal or a result, but no NaN."""
+    path, out = recording(tmp_path / "short.csv"), tmp_path / "out"
+    done = subprocess.run([sinew, "diagnose", path, "--out", out], capture_output=True, text=True)
+    assert done.returncode in (0, 1) and "NaN" not in done.stdout and "panicked" not in done.stderr
+    if done.returncode == 0:
+        diagnosis = json.loads((out / "diagnosis.json").read_text())
+        assert isinstance(diagnosis["improvement"], float)
+        assert all(isinstance(signal["extended_rms"], float) for signal in diagnosis["signals"].values())
 
 
 BAD_PARAMETERS = {

@@ -1,5 +1,6 @@
 """The demonstration: it finds the dry friction in the recording that ships, and the extended FMU is the better one."""
 
+import csv
 import json
 
 import numpy as np
@@ -85,6 +86,31 @@ def test_extended_fmu_is_nearer_to_the_recording(folder, muscle, note, mass):
     extended = replay_error(Fmu(folder / "PneumaticMuscle.fmu"), recording)
     note(f"replay of dry_friction_{mass}kg.csv: {1e3 * nominal:.2f} mm nominal, {1e3 * extended:.2f} mm extended")
     assert extended < 0.7 * nominal
+
+
+OUTPUTS = ("gauge_pressure", "contraction", "force")
+
+
+@pytest.mark.parametrize("mass", [20, 60])
+def test_tool_and_fmu_simulate_alike(folder, muscle, mass):
+    """What the report shows of the nominal and of the extended model is what the two FMUs do."""
+    recording = read_csv(ROOT / "data" / f"dry_friction_{mass}kg.csv")
+    for model, fmu in (("nominal", muscle), ("extended", Fmu(folder / "PneumaticMuscle.fmu"))):
+        shown = columns_of(folder / "simulated.csv", f"dry_friction_{mass}kg.csv", model)
+        start = {"load.mass": recording["load_mass"][0], "initial.gauge_pressure": shown[0, 0]}
+        with Instance(fmu, start) as instance:
+            names = [f"measured.{name}" for name in OUTPUTS]
+            simulated = follow(instance, recording["time"], recording["command"], names)
+        assert simulated.shape == shown.shape
+        assert (np.abs(simulated - shown).max(axis=0) <= 1e-6 * np.abs(shown).max(axis=0)).all()
+
+
+def columns_of(path, recording, model):
+    """Simulated signals of one recording, of shape (n_samples, n_outputs)."""
+    units = dict(gauge_pressure="Pa", contraction="m", force="N")
+    with open(path, newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["recording"] == recording]
+    return np.array([[float(row[f"{model}_{name} [{units[name]}]"]) for name in OUTPUTS] for row in rows])
 
 
 def test_recording_says_friction_to_the_diagnosis_too(sinew, tmp_path):

@@ -1,0 +1,156 @@
+//! The nominal model against solutions by scipy (`tests/reference`), and against closed forms.
+
+use sinew::GRAVITY;
+use sinew::measurement::{Recording, Signal};
+use sinew::model::Simulator;
+use sinew::parameters::Parameters;
+use sinew::plant::{PneumaticMuscle, equilibrium};
+use sinew::simulation::closed_loop;
+use std::path::Path;
+
+/// Largest differences of contraction (m) and pressure (Pa) from a golden file.
+fn differences(preset: &str, file: &str) -> (f64, f64) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference").join(file);
+    let golden = Recording::read(&path, &[]).unwrap();
+    let column = |signal| golden.get(signal).unwrap();
+    let (command, pressure) = (column(Signal::Command), column(Signal::GaugePressure));
+    let contraction = column(Signal::Contraction);
+    let mut parameters = Parameters::preset(preset).unwrap();
+    parameters.load.mass = golden.load_mass().unwrap();
+    parameters.initial.gauge_pressure = parameters.valve.target_pressure(command[0]);
+    let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
+    muscle.initialize(0.0).unwrap();
+    let (mut worst_contraction, mut worst_pressure) = (0.0_f64, 0.0_f64);
+    for k in 0..golden.time.len() {
+        let out = muscle.outputs();
+        worst_contraction = worst_contraction.max((out.contraction - contraction[k]).abs());
+        worst_pressure = worst_pressure.max((out.gauge_pressure - pressure[k]).abs());
+        if k + 1 < golden.time.len() {
+            let span = golden.time[k + 1] - golden.time[k];
+            muscle.inputs.command = command[k];
+            muscle.slopes.command = (command[k + 1] - command[k]) / span;
+            muscle.advance(span).unwrap();
+        }
+    }
+    (worst_contraction, worst_pressure)
+}
+
+#[test]
+fn trajectories_agree_with_scipy() {
+    let cases = [
+        ("dmsp-40-1000", "nominal_staircase_20kg.csv"),
+        ("dmsp-40-1000", "nominal_staircase_80kg.csv"),
+        ("dmsp-40-1000", "nominal_ramps_20kg.csv"),
+        ("dmsp-40-1000", "nominal_ramps_80kg.csv"),
+        ("dmsp-40-1000", "nominal_multisine_20kg.csv"),
+        ("dmsp-40-1000", "nominal_multisine_80kg.csv"),
+        ("dmsp-40-1000/improved-mckibben", "improved_mckibben_multisine_40kg.csv"),
+        ("dmsp-40-290", "short_muscle_multisine_40kg.csv"),
+    ];
+    for (preset, file) in cases {
+        let (contraction, pressure) = differences(preset, file);
+        println!("{file}: contraction within {contraction:.1e} m, pressure within {pressure:.1e} Pa");
+        assert!(contraction < 1e-6 && pressure < 1.0, "{file}: {contraction} m, {pressure} Pa");
+    }
+}
+
+#[test]
+fn eighty_kilograms_at_four_and_a_half_bar_contract_22_6_centimetres() {
+    let long = Parameters::preset("dmsp-40-1000").unwrap();
+    let contraction = equilibrium(&long, 4.5e5, 80.0 * GRAVITY).unwrap();
+    assert!((contraction - 0.226).abs() < 5e-4, "{contraction}");
+}
+
+#[test]
+fn the_short_muscle_contracts_5_7_to_6_8_centimetres() {
+    let short = Parameters::preset("dmsp-40-290").unwrap();
+    let at = |mass: f64| equilibrium(&short, 4.5e5, mass * GRAVITY).unwrap();
+    assert!((at(80.0) - 0.057).abs() < 1e-3 && (at(10.0) - 0.068).abs() < 1e-3, "{} {}", at(80.0), at(10.0));
+}
+
+#[test]
+fn mckibben_area_is_the_change_of_volume() {
+    for preset in ["dmsp-40-1000/improved-mckibben", "dmsp-40-290/improved-mckibben"] {
+        let Parameters { muscle, force_models, .. } = Parameters::preset(preset).unwrap();
+        for k in 1..20 {
+            let (x, h) = (muscle.rest_length * 0.012 * f64::from(k), 1e-5 * muscle.rest_length);
+            // x = L0 - L, hence dx = -dL.
+            let difference = (muscle.volume(x + h) - muscle.volume(x - h)) / (2.0 * h);
+            let area = force_models.virtual_area(&muscle, x);
+            assert!((area - difference).abs() < 1e-7 * area.abs().max(1e-3), "{preset} at {x}: {area} {difference}");
+        }
+    }
+}
+
+#[test]
+fn improved_mckibben_reproduces_the_thesis_forces_as_well_as_it_can() {
+    // Forces of the virtual-area model at 1 to 4.5 bar, 90 to 820 N; plain McKibben is the area term alone.
+    let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+    for (preset, reach, improved_bar, plain_about) in
+        [("dmsp-40-1000", 0.24, 50.0, 695.0), ("dmsp-40-290", 0.071, 76.0, 978.0)]
+    {
+        let virtual_area = Parameters::preset(preset).unwrap();
+        let mckibben = Parameters::preset(&format!("{preset}/improved-mckibben")).unwrap();
+        let (mut improved, mut plain) = (Vec::new(), Vec::new());
+        for bar in 2..=9 {
+            for k in 0..40 {
+                let (pressure, x) = (0.5e5 * f64::from(bar), reach * f64::from(k) / 39.0);
+                let wanted = virtual_area.force_models.force(&virtual_area.muscle, pressure, x);
+                if (90.0..820.0).contains(&wanted) {
+                    improved.push(mckibben.force_models.force(&mckibben.muscle, pressure, x) - wanted);
+                    plain.push(pressure * mckibben.force_models.virtual_area(&mckibben.muscle, x) - wanted);
+                }
+            }
+        }
+        let (improved, plain) = (rms(&improved), rms(&plain));
+        println!("{preset}: improved {improved:.1} N, plain {plain:.1} N");
+        assert!(improved < improved_bar && (plain - plain_about).abs() < 1.0, "{preset}: {improved} {plain}");
+    }
+}
+
+#[test]
+fn the_load_balances_its_energy() {
+    // Work of the muscle's pull = gain of potential and kinetic energy.
+    let mut parameters = Parameters::default();
+    parameters.load.mass = 40.0;
+    parameters.initial.gauge_pressure = 1.5e5;
+    let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
+    muscle.initialize(0.0).unwrap();
+    muscle.inputs.command = 2.5;
+    let start = muscle.outputs();
+    let (mut work, mut before, step) = (0.0, start, 1e-4);
+    for _ in 0..20_000 {
+        muscle.advance(step).unwrap();
+        let now = muscle.outputs();
+        let power = |out: &sinew::plant::MuscleOutputs| out.force * out.contraction_velocity;
+        work += 0.5 * step * (power(&before) + power(&now));
+        before = now;
+    }
+    let potential = 40.0 * GRAVITY * (before.contraction - start.contraction);
+    let kinetic = 20.0 * before.contraction_velocity.powi(2);
+    assert!(potential > 10.0, "the load must have moved");
+    assert!((work - potential - kinetic).abs() < 1e-4 * work, "{work} {potential} {kinetic}");
+}
+
+#[test]
+fn closed_loop_with_the_printed_gains_errs_as_an_independent_simulation_does() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/closed_loop.csv");
+    let mut checked = 0;
+    for row in csv::Reader::from_path(path).unwrap().records() {
+        let row = row.unwrap();
+        let number = |k: usize| row[k].parse::<f64>().unwrap();
+        if &row[0] != "static" {
+            continue;
+        }
+        let mut parameters = Parameters::preset("dmsp-40-1000/improved-mckibben/thesis").unwrap();
+        parameters.muscle.damping = 50.0;
+        parameters.valve.bandwidth = if &row[1] == "2.5 Hz" { 2.5 * std::f64::consts::TAU } else { 2.5 };
+        (parameters.load.mass, parameters.reference.velocity) = (number(2), number(3));
+        let run = closed_loop(&parameters, 1e-3, parameters.reference.duration() + 2.0).unwrap();
+        let (ours, theirs) = (1e3 * run.largest_error(), 1e3 * number(4));
+        println!("valve {}, {} kg, {} m/s: {ours:.3} mm, independent {theirs:.3} mm", &row[1], &row[2], &row[3]);
+        assert!((ours - theirs).abs() < 0.2 * theirs);
+        checked += 1;
+    }
+    assert_eq!(checked, 18);
+}
