@@ -21,12 +21,15 @@ pub enum Signal {
 
 use Signal::{Command, Contraction, Diameter, Force, GaugePressure, LoadMass, SupplyPressure, Temperature, Time};
 
-const PRESSURE: &[(&str, f64)] =
-    &[("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("mbar", 1e2), ("bar", 1e5), ("psi", 6894.757_293_168)];
-const LENGTH: &[(&str, f64)] = &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)];
+/// Symbols of units with their size in SI; the first is SI.
+type Units = &'static [(&'static str, f64)];
 
-/// Columns that are understood: name, meaning, and units with their size in SI. The first unit is SI.
-const COLUMNS: &[(&str, Signal, &[(&str, f64)])] = &[
+const PRESSURE: Units =
+    &[("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("mbar", 1e2), ("bar", 1e5), ("psi", 6_894.757_293_168)];
+const LENGTH: Units = &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)];
+
+/// Columns that are understood: name, meaning, and units.
+const COLUMNS: &[(&str, Signal, Units)] = &[
     ("time", Time, &[("s", 1.0), ("ms", 1e-3)]),
     ("command", Command, &[("V", 1.0), ("mV", 1e-3)]),
     ("gauge_pressure", GaugePressure, PRESSURE),
@@ -172,9 +175,9 @@ impl Recording {
         bridged[last..].fill(values[last]);
         for pair in known.windows(2) {
             let (a, b) = (pair[0], pair[1]);
-            for k in a + 1..b {
-                let share = (self.time[k] - self.time[a]) / (self.time[b] - self.time[a]);
-                bridged[k] = values[a] + share * (values[b] - values[a]);
+            for (time, value) in self.time[a..b].iter().zip(&mut bridged[a..b]) {
+                let share = (time - self.time[a]) / (self.time[b] - self.time[a]);
+                *value = values[a] + share * (values[b] - values[a]);
             }
         }
         Some(bridged)

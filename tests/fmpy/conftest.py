@@ -4,7 +4,6 @@ import pytest
 
 from support import MODELS, ROOT, TARGET, Fmu, run, write_parameters
 
-
 NOTES = pytest.StashKey()
 
 

@@ -12,8 +12,13 @@ from pathlib import Path
 import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (FMU2Slave, fmi2CallbackAllocateMemoryTYPE, fmi2CallbackFreeMemoryTYPE, fmi2CallbackFunctions,
-                       fmi2CallbackLoggerTYPE)
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
 from fmpy.logging import addLoggerProxy
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -131,7 +136,8 @@ class Instance:
 
     def derivative(self, output, known):
         """Partial derivative of an output by one known variable."""
-        return self.slave.getDirectionalDerivative(self.fmu.references([output]), self.fmu.references([known]), [1.0])[0]
+        output_reference, known_reference = self.fmu.references([output]), self.fmu.references([known])
+        return self.slave.getDirectionalDerivative(output_reference, known_reference, [1.0])[0]
 
     def step(self, duration):
         self.slave.doStep(self.time, duration)

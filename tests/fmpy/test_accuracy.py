@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from muscles import GRAVITY, LONG_REST_LENGTH, VIRTUAL_AREA_1000, mckibben, static_force
 from scipy.optimize import brentq
 
+from muscles import GRAVITY, LONG_REST_LENGTH, VIRTUAL_AREA_1000, mckibben, static_force
 from support import REFERENCE, Instance, follow, read_csv
 
 PRESETS = {
@@ -82,7 +82,11 @@ def assert_same_to_1e6(table, expected):
 def test_starts_in_static_equilibrium(muscle):
     """80 kg at 4.5 bar contract DMSP-40-1000 by 22.6 cm; outputs hold before the first step."""
     mass, gauge_pressure = 80.0, 4.5e5
-    expected = brentq(lambda x: static_force(VIRTUAL_AREA_1000, gauge_pressure, x) - mass * GRAVITY, 0.1, 0.3, xtol=1e-14)
+
+    def surplus(x):
+        return static_force(VIRTUAL_AREA_1000, gauge_pressure, x) - mass * GRAVITY
+
+    expected = brentq(surplus, 0.1, 0.3, xtol=1e-14)
     assert expected == pytest.approx(0.226, abs=5e-4)
     with Instance(muscle, {"load.mass": mass, "initial.gauge_pressure": gauge_pressure}, initialize=False) as instance:
         instance.slave.setupExperiment()
@@ -112,14 +116,15 @@ def test_stays_in_static_equilibrium(muscle):
 def test_actuator_pulls_as_the_muscle_that_hangs(export):
     """The same motion imposed on the actuator gives the same force and pressure."""
     recording = {name: column[:501] for name, column in read_csv(REFERENCE / "nominal_multisine_80kg.csv").items()}
-    pull, expected = [], recording["force"][1:]
-    with Instance(export()["PneumaticActuator"], {"initial.gauge_pressure": recording["gauge_pressure"][0]}) as instance:
+    pull, expected, motion = [], recording["force"][1:], ("contraction", "contraction_velocity")
+    start = {"initial.gauge_pressure": recording["gauge_pressure"][0]}
+    with Instance(export()["PneumaticActuator"], start) as instance:
         for row in range(500):
             slope = (recording["command"][row + 1] - recording["command"][row]) / 0.01
             instance.set({"valve.command": recording["command"][row]})
             instance.set_slopes({"valve.command": slope})
             instance.step(0.01)
-            instance.set({f"muscle.{name}": recording[name][row + 1] for name in ("contraction", "contraction_velocity")})
+            instance.set({f"muscle.{name}": recording[name][row + 1] for name in motion})
             pull.append(instance.get("muscle.force")[0])
     assert np.abs(pull - expected).max() < 0.01
 

@@ -4,8 +4,8 @@ import csv
 
 import numpy as np
 import pytest
-from closed_loop import ACCELERATION, BANDWIDTHS, DAMPING, STROKE, holding_pressure, profile
 
+from closed_loop import ACCELERATION, BANDWIDTHS, DAMPING, STROKE, holding_pressure, profile
 from support import REFERENCE, Instance
 
 PRESET = "dmsp-40-1000/improved-mckibben/thesis"
@@ -32,7 +32,7 @@ def largest_error(fmus, valve, mass, velocity):
         for _ in range(round(duration / STEP)):
             setpoints = trajectory.get(*TRAJECTORY)
             measured = muscle.get("measured.contraction")[0]
-            controller.set(dict(zip(TRAJECTORY, setpoints)) | {"measured_contraction": measured})
+            controller.set(dict(zip(TRAJECTORY, setpoints, strict=True)) | {"measured_contraction": measured})
             muscle.set({"valve.command": controller.get("command")[0]})
             largest = max(largest, abs(setpoints[0] - measured))
             for instance in (trajectory, controller, muscle):
