@@ -6,7 +6,7 @@ use crate::model::{Documentation, Feedthrough, System};
 use crate::parameters::Parameters;
 use crate::plant::holding_pressure;
 
-crate::variables! {
+crate::variables::variables! {
     /// PID controller of the contraction.
     ///
     /// # Model
@@ -31,7 +31,7 @@ crate::variables! {
     }
 }
 
-crate::variables! {
+crate::variables::variables! {
     /// Feed-forward of the pressure that the reference needs.
     ///
     /// # Model
@@ -48,7 +48,7 @@ crate::variables! {
     }
 }
 
-crate::signals! {
+crate::variables::signals! {
     /// What the controller is given.
     pub struct ControllerInputs in "" as Input {
         /// Reference of the contraction
@@ -62,7 +62,7 @@ crate::signals! {
     }
 }
 
-crate::signals! {
+crate::variables::signals! {
     /// What the controller gives.
     pub struct ControllerOutputs in "" as Output {
         /// Command of the valve

@@ -1,7 +1,7 @@
 //! Pneumatic artificial muscles as FMUs that learn from measurements.
 //!
 //! In the order data flows: [`variables`] declares what there is; [`muscle`], [`valve`], [`load`] and [`effects`] are the
-//! physics; [`plant`], [`controller`] and [`reference`] put it together; [`model`] steps it and [`mod@model_description`] describes
+//! physics; [`plant`], [`controller`] and [`mod@reference`] put it together; [`model`] steps it and [`mod@model_description`] describes
 //! it. With the feature `tool`, [`package`] makes FMUs, [`measurement`] reads recordings, [`simulation`] replays them and
 //! [`diagnosis`] says what the model gets wrong.
 

@@ -1,6 +1,6 @@
 //! The hanging load.
 
-crate::variables! {
+crate::variables::variables! {
     /// A mass that hangs from the muscle.
     ///
     /// # Model
@@ -14,7 +14,7 @@ crate::variables! {
     }
 }
 
-crate::variables! {
+crate::variables::variables! {
     /// Where a simulation starts.
     pub struct Initial in "initial." as Fixed {
         /// Gauge pressure at the start, at which the load hangs still

@@ -19,7 +19,7 @@ const SOURCE: &str = "Master thesis \u{201c}Comparative Assessment and Improveme
 
 const GROUPS: &[&str] = &["muscle", "virtual_area", "improved_mckibben", "valve", "load", "initial"];
 
-crate::signals! {
+crate::variables::signals! {
     /// What acts on the muscle with its hanging load.
     pub struct MuscleInputs as Input {
         /// Command of the valve
@@ -29,7 +29,7 @@ crate::signals! {
     }
 }
 
-crate::signals! {
+crate::variables::signals! {
     /// What the muscle with its hanging load does and shows.
     pub struct MuscleOutputs as Output {
         /// Rest length minus length
@@ -51,7 +51,7 @@ crate::signals! {
     }
 }
 
-crate::signals! {
+crate::variables::signals! {
     /// What acts on the muscle when its motion comes from outside.
     pub struct ActuatorInputs as Input {
         /// Command of the valve
@@ -63,7 +63,7 @@ crate::signals! {
     }
 }
 
-crate::signals! {
+crate::variables::signals! {
     /// What the driven muscle does and shows.
     pub struct ActuatorOutputs as Output {
         /// Pull of the muscle
@@ -279,7 +279,7 @@ impl System for PneumaticActuator {
     }
 }
 
-crate::signals! {
+crate::variables::signals! {
     /// What is known of the muscle when its pressure was measured.
     pub struct MeasuredInputs as Input {
         /// Gauge pressure in the muscle

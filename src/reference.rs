@@ -4,7 +4,7 @@ use crate::Result;
 use crate::model::{Documentation, System};
 use crate::parameters::Parameters;
 
-crate::variables! {
+crate::variables::variables! {
     /// From one contraction to another with limited velocity and acceleration.
     ///
     /// # Model
@@ -66,7 +66,7 @@ impl Reference {
     }
 }
 
-crate::signals! {
+crate::variables::signals! {
     /// Setpoint of the contraction.
     pub struct Setpoint in "" as Output {
         /// Reference of the contraction
@@ -78,7 +78,7 @@ crate::signals! {
     }
 }
 
-crate::signals! {
+crate::variables::signals! {
     /// A trajectory takes no inputs.
     pub struct NoInputs in "" as Input {}
 }

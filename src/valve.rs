@@ -1,6 +1,6 @@
 //! The proportional pressure valve.
 
-crate::variables! {
+crate::variables::variables! {
     /// Proportional valve as a first-order low-pass filter.
     ///
     /// # Model

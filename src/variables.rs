@@ -1,6 +1,6 @@
 //! Declaring a variable once.
 //!
-//! [`variables!`](crate::variables) turns one list of fields into the struct, its defaults, and the table from which
+//! The macro `variables!` turns one list of fields into the struct, its defaults, and the table from which
 //! the FMU description, the parameter file, the bounds of a fit and the documentation follow.
 
 /// A unit as FMI wants it: a symbol and exponents of the base units.
@@ -173,7 +173,6 @@ pub trait Signals: Declared + Copy + Default + Send {
 }
 
 /// Start, unit and range of every field of a group: `name: type = start, UNIT, min..=max;`.
-#[macro_export]
 macro_rules! variables {
     (
         $(#[$attribute:meta])*
@@ -233,7 +232,6 @@ macro_rules! variables {
 }
 
 /// A group of inputs or outputs: reals of which any value is accepted.
-#[macro_export]
 macro_rules! signals {
     (
         $(#[$attribute:meta])*
@@ -241,7 +239,7 @@ macro_rules! signals {
             $( #[doc = $description:literal] $field:ident: $unit:ident; )*
         }
     ) => {
-        $crate::signals! {
+        $crate::variables::signals! {
             $(#[$attribute])*
             pub struct $Struct as $role {
                 $( #[doc = $description] $field = concat!($prefix, stringify!($field)), $unit; )*
@@ -302,3 +300,5 @@ macro_rules! signals {
         }
     };
 }
+
+pub(crate) use {signals, variables};

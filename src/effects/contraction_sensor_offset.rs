@@ -1,6 +1,6 @@
 use super::{Description, Effect, Readings};
 
-crate::variables! {
+crate::variables::variables! {
     /// A position sensor whose zero is not at the rest length.
     ///
     /// # Model

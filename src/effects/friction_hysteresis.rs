@@ -1,6 +1,6 @@
 use super::{Description, Effect, Point};
 
-crate::variables! {
+crate::variables::variables! {
     /// Dry friction between threads and rubber, in the form of Dahl.
     ///
     /// # Model

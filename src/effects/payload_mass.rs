@@ -1,6 +1,6 @@
 use super::{Description, Effect};
 
-crate::variables! {
+crate::variables::variables! {
     /// A load that is not what was entered.
     ///
     /// # Model

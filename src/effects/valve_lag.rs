@@ -1,6 +1,6 @@
 use super::{Description, Effect};
 
-crate::variables! {
+crate::variables::variables! {
     /// A valve that follows more slowly than nominal.
     ///
     /// # Model

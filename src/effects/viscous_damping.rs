@@ -1,6 +1,6 @@
 use super::{Description, Effect, Point};
 
-crate::variables! {
+crate::variables::variables! {
     /// Viscous damping beyond the nominal one, different for shortening and lengthening.
     ///
     /// # Model

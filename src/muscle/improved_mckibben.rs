@@ -1,7 +1,7 @@
 use super::{ForceModel, Muscle};
 use std::f64::consts::PI;
 
-crate::variables! {
+crate::variables::variables! {
     /// Improved McKibben model: inextensible threads around an elastic membrane.
     ///
     /// # Model

@@ -9,7 +9,7 @@ pub use virtual_area::VirtualArea;
 use crate::variables::{Choice, Kind, Scalar};
 use std::f64::consts::PI;
 
-crate::variables! {
+crate::variables::variables! {
     /// The muscle: its braid at rest, its damping, and which force model holds.
     ///
     /// # Model

@@ -1,6 +1,6 @@
 use super::{ForceModel, Muscle};
 
-crate::variables! {
+crate::variables::variables! {
     /// Virtual-area model: the muscle as a cylinder whose piston shrinks as it shortens.
     ///
     /// # Model
