@@ -154,3 +154,51 @@ fn closed_loop_with_the_printed_gains_errs_as_an_independent_simulation_does() {
     }
     assert_eq!(checked, 18);
 }
+
+#[test]
+fn default_gains_leave_a_margin_on_the_linearised_plant() {
+    use nalgebra::Complex;
+    let mut worst = 0.0_f64;
+    for preset in ["dmsp-40-1000", "dmsp-40-290"] {
+        let Parameters { muscle, force_models, valve, controller: pid, .. } = Parameters::preset(preset).unwrap();
+        for mass in [20.0, 40.0, 80.0] {
+            for tenth in 0..=10 {
+                let x = 0.02 * f64::from(tenth) * muscle.rest_length;
+                let area = force_models.virtual_area(&muscle, x);
+                let pressure = (mass * GRAVITY - force_models.elastic_force(&muscle, x)) / area;
+                let force = |x: f64| force_models.force(&muscle, pressure, x);
+                let stiffness = (force(x - 1e-6) - force(x + 1e-6)) / 2e-6;
+                for k in 0..2000 {
+                    let s = Complex::new(0.0, 10.0_f64.powf(-2.0 + 5.0 * f64::from(k) / 2000.0));
+                    let motion = s * s * mass + s * muscle.damping + stiffness;
+                    let plant = (s / valve.bandwidth + 1.0).inv() * (valve.gain * area) / motion;
+                    let derivative = s * pid.derivative_gain / (s * pid.filter_time_constant + 1.0);
+                    let controller = s.inv() * pid.integral_gain + pid.proportional_gain + derivative;
+                    worst = worst.max((plant * controller + 1.0).inv().norm());
+                }
+                assert!(stiffness > 0.0, "an unstable plant would need another criterion");
+            }
+        }
+    }
+    println!("largest sensitivity {worst:.2}");
+    assert!(worst < 1.8, "{worst}");
+}
+
+#[test]
+fn the_closed_loop_with_default_gains_settles() {
+    for preset in ["dmsp-40-1000", "dmsp-40-290"] {
+        for mass in [20.0, 40.0, 80.0] {
+            let mut parameters = Parameters::preset(preset).unwrap();
+            parameters.load.mass = mass;
+            parameters.reference.target = 0.15 * parameters.muscle.rest_length;
+            let run = closed_loop(&parameters, 1e-3, parameters.reference.duration() + 5.0).unwrap();
+            let left = run.control_error.last().unwrap().abs();
+            println!(
+                "{preset}, {mass} kg: largest error {:.2} mm, left {:.4} mm",
+                1e3 * run.largest_error(),
+                1e3 * left
+            );
+            assert!(run.largest_error() < 2e-3 && left < 1e-5);
+        }
+    }
+}
