@@ -130,8 +130,7 @@ impl System for PidFeedForward {
         limits: "The feed-forward knows the muscle as well as its parameters do: give both FMUs the same ones.",
         source: "Thesis eqs. 5.4 to 5.7 and section 5.3. Filter, limits, inertia and valve inversion are additions.",
     };
-    const GROUPS: &'static [&'static str] =
-        &["muscle", "virtual_area", "improved_mckibben", "valve", "load", "initial", "controller", "feed_forward"];
+    const GROUPS: &'static [&'static str] = &["muscle", "valve", "load", "initial", "controller", "feed_forward"];
     const FEEDTHROUGH: &'static [Feedthrough] = &[
         ("command", &["setpoint", "setpoint_velocity", "setpoint_acceleration", "measured_contraction"]),
         ("feed_forward", &["setpoint", "setpoint_velocity", "setpoint_acceleration"]),

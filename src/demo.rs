@@ -45,9 +45,8 @@ pub fn run(folder: &Path, done: &(dyn Fn(&str) + Sync)) -> Result<Demo> {
     for (name, bytes) in RECORDINGS {
         files.push((folder.join("recordings").join(name), bytes.to_vec()));
     }
-    if let Some(svg) = report::recording_plots(&nominal, &diagnosis.extended, &recordings[1])?.pop() {
-        files.push((folder.join("residual.svg"), svg.into_bytes()));
-    }
+    let residual = report::residual_plot(&nominal, &diagnosis.extended, &recordings[1])?;
+    files.extend(residual.map(|svg| (folder.join("residual.svg"), svg.into_bytes())));
     let mut written = package::export(&nominal, &libraries, &folder.join("nominal"))?;
     written.extend(package::write_whole(files)?);
     Ok(Demo { closed_loop, diagnosis, files: written })

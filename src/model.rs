@@ -4,6 +4,7 @@
 
 use crate::effects::Effects;
 use crate::integrator;
+use crate::muscle::ForceModels;
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Role, Signals, Variable};
 use crate::{Error, Result};
@@ -74,7 +75,7 @@ pub trait System: Copy + Send + 'static {
     const DESCRIPTION: &'static str;
     /// What a user should know.
     const DOCUMENTATION: Documentation;
-    /// The groups of parameters that it uses, by the first part of their names.
+    /// The groups of parameters that it uses, by the first part of their names; with `muscle` come its force models.
     const GROUPS: &'static [&'static str];
     /// Whether it also has the parameters of every effect.
     const EFFECTS: bool = false;
@@ -167,7 +168,9 @@ impl Interface {
 
 fn used_by<S: System>(declaration: &Variable) -> bool {
     let group = declaration.group();
-    S::GROUPS.contains(&group) || (S::EFFECTS && Effects::DESCRIPTIONS.iter().any(|effect| effect.name == group))
+    S::GROUPS.contains(&group)
+        || (S::GROUPS.contains(&"muscle") && ForceModels::GROUPS.contains(&group))
+        || (S::EFFECTS && Effects::DESCRIPTIONS.iter().any(|effect| effect.name == group))
 }
 
 fn exposed_name<S: System>(declaration: &'static Variable) -> &'static str {

@@ -115,7 +115,7 @@ fn documentation(interface: &Interface, parameters: &Parameters) -> String {
                 }
             });
             let start = start.map(|value| match declaration.kind {
-                Kind::Real => format!("{value}"),
+                Kind::Real => short(value),
                 Kind::Enumeration(_, choices) => choices[value as usize - 1].name.to_owned(),
             });
             context! {
@@ -124,8 +124,8 @@ fn documentation(interface: &Interface, parameters: &Parameters) -> String {
                 unit => declaration.unit.symbol,
                 description => declaration.description,
                 start,
-                min => declaration.min.is_finite().then_some(declaration.min),
-                max => declaration.max.is_finite().then_some(declaration.max),
+                min => declaration.min.is_finite().then(|| short(declaration.min)),
+                max => declaration.max.is_finite().then(|| short(declaration.max)),
             }
         })
         .collect();
@@ -160,6 +160,23 @@ pub(crate) fn render(name: &str, template: &str, values: &minijinja::Value) -> S
     environment.add_template(name, template).expect("a template that ships is valid");
     let template = environment.get_template(name).expect("it was just added");
     template.render(values).expect("a template that ships renders")
+}
+
+/// A number for people, with four significant digits.
+pub(crate) fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() || (value.fract() == 0.0 && value.abs() < 1e4) {
+        return value.to_string();
+    }
+    if value.abs() >= 1e6 {
+        return format!("{value:.3e}");
+    }
+    #[allow(clippy::cast_possible_truncation)]
+    let digits = 3 - value.abs().log10().floor() as i32;
+    match digits {
+        0..=6 => format!("{value:.*}", digits.unsigned_abs() as usize),
+        ..0 => format!("{value:.0}"),
+        _ => format!("{value:.3e}"),
+    }
 }
 
 /// Writes the FMUs of all models into a folder and returns their paths.

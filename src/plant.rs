@@ -17,8 +17,6 @@ const LIMITS: &str = "Static force identified at 0.5 to 4.5 bar and 100 to 800 N
 const SOURCE: &str = "Master thesis \u{201c}Comparative Assessment and Improvement of Pneumatic Artificial Muscles \
     Modelling\u{201d}, Politecnico di Milano: eqs. 4.5 to 4.11, 4.17 (sign of b\u{b2} corrected), 5.3, 5.4.";
 
-const GROUPS: &[&str] = &["muscle", "virtual_area", "improved_mckibben", "valve", "load", "initial"];
-
 crate::variables::signals! {
     /// What acts on the muscle with its hanging load.
     pub struct MuscleInputs as Input {
@@ -157,7 +155,7 @@ impl System for PneumaticMuscle {
         limits: LIMITS,
         source: SOURCE,
     };
-    const GROUPS: &'static [&'static str] = GROUPS;
+    const GROUPS: &'static [&'static str] = &["muscle", "valve", "load", "initial"];
     const EFFECTS: bool = true;
     const FEEDTHROUGH: &'static [Feedthrough] = &[];
     const INITIAL_INPUTS: &'static [&'static str] = &["load.external_force"];
@@ -237,7 +235,7 @@ impl System for PneumaticActuator {
         limits: LIMITS,
         source: SOURCE,
     };
-    const GROUPS: &'static [&'static str] = &["muscle", "virtual_area", "improved_mckibben", "valve", "initial"];
+    const GROUPS: &'static [&'static str] = &["muscle", "valve", "initial"];
     const EFFECTS: bool = true;
     const FEEDTHROUGH: &'static [Feedthrough] = &[
         ("muscle.force", &["muscle.contraction", "muscle.contraction_velocity"]),

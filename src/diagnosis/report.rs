@@ -4,7 +4,7 @@ use super::{Diagnosis, FittedParameter, Verdict};
 use crate::Result;
 use crate::measurement::{Recording, Signal};
 use crate::model::models;
-use crate::package::{Library, fmu, render};
+use crate::package::{Library, fmu, render, short};
 use crate::parameters::Parameters;
 use crate::plot::{Curve, plot};
 use crate::simulation::{OUTPUTS, replay, replay_muscle};
@@ -100,14 +100,15 @@ pub fn files(
     folder: &Path,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
     let extended = &diagnosis.extended;
-    let mut plots = Vec::new();
+    let (mut exposing, mut plots) = (Vec::new(), Vec::new());
     for recording in recordings {
-        plots.extend(recording_plots(nominal, extended, recording)?);
+        exposing.extend(residual_plot(nominal, extended, recording)?);
+        plots.extend(time_plots(nominal, extended, recording)?);
     }
     let json = format!("{:#}\n", to_json(diagnosis));
     let mut files = vec![
         (folder.join("diagnosis.json"), json.into_bytes()),
-        (folder.join("report.html"), html(diagnosis, &plots).into_bytes()),
+        (folder.join("report.html"), html(diagnosis, &exposing, &plots).into_bytes()),
         (folder.join("extended.toml"), extended.to_toml().into_bytes()),
         (folder.join("simulated.csv"), simulated_csv(&[("nominal", nominal), ("extended", extended)], recordings)?),
     ];
@@ -119,11 +120,18 @@ pub fn files(
     Ok(files)
 }
 
-/// Measured against simulated over time for every signal, and the residual over the contraction, as SVG.
+/// Measured against simulated over time, and the residual over the contraction, as SVG.
 ///
 /// # Errors
 /// Errors of the simulation.
 pub fn recording_plots(nominal: &Parameters, extended: &Parameters, recording: &Recording) -> Result<Vec<String>> {
+    let mut plots = time_plots(nominal, extended, recording)?;
+    plots.extend(residual_plot(nominal, extended, recording)?);
+    Ok(plots)
+}
+
+/// Measured against simulated over time for every signal, as SVG.
+fn time_plots(nominal: &Parameters, extended: &Parameters, recording: &Recording) -> Result<Vec<String>> {
     let (before, after) = (replay(nominal, recording)?, replay(extended, recording)?);
     let name = recording.name();
     let mut plots = Vec::new();
@@ -144,13 +152,15 @@ pub fn recording_plots(nominal: &Parameters, extended: &Parameters, recording: &
         let label = format!("{} [{unit}]", signal.name().replace('_', " "));
         plots.push(plot(&format!("{name}: {}", signal.name().replace('_', " ")), "time [s]", &label, &curves));
     }
-    plots.extend(residual_plot(nominal, extended, recording)?);
     Ok(plots)
 }
 
 /// The residual over the contraction: of the force, with the chain cut at the measured pressure and contraction, where
 /// these were measured; else of the contraction.
-fn residual_plot(nominal: &Parameters, extended: &Parameters, recording: &Recording) -> Result<Option<String>> {
+///
+/// # Errors
+/// Errors of the simulation.
+pub fn residual_plot(nominal: &Parameters, extended: &Parameters, recording: &Recording) -> Result<Option<String>> {
     let Some(contraction) = recording.get(Signal::Contraction) else { return Ok(None) };
     let cut = recording.get(Signal::GaugePressure).is_some() && recording.get(Signal::Force).is_some();
     let signal = if cut { Signal::Force } else { Signal::Contraction };
@@ -211,7 +221,7 @@ fn quoted(text: &str) -> String {
     String::from_utf8_lossy(&bytes).trim_end().to_owned()
 }
 
-fn html(diagnosis: &Diagnosis, plots: &[String]) -> String {
+fn html(diagnosis: &Diagnosis, exposing: &[String], plots: &[String]) -> String {
     let parameters = |all: &[FittedParameter]| {
         let row = |p: &FittedParameter| {
             context! {
@@ -248,27 +258,13 @@ fn html(diagnosis: &Diagnosis, plots: &[String]) -> String {
         .map(|r| context! { effect => r.effect, error => format!("{:.0} %", 100.0 * r.relative_error), evidence => format!("{:.0}", r.evidence) })
         .collect();
     let page = context! {
-        headline => headline(diagnosis), causes, signals, ranking, plots => plots.to_vec(),
+        headline => headline(diagnosis), causes, signals, ranking, plots => plots.to_vec(), exposing => exposing.to_vec(),
         verdict => format!("{}", to_json(diagnosis)["verdict"].as_str().unwrap_or_default().replace('_', " ")),
         improvement => format!("{:.0} %", 100.0 * diagnosis.improvement),
         held_out => diagnosis.held_out.clone(), corrections => parameters(&diagnosis.corrections),
         version => env!("CARGO_PKG_VERSION"),
     };
     render("report.html", include_str!("report.html"), &page)
-}
-
-/// A number with four significant digits.
-fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return value.to_string();
-    }
-    #[allow(clippy::cast_possible_truncation)]
-    let digits = 3 - value.abs().log10().floor() as i32;
-    match digits {
-        0..=6 => format!("{value:.*}", digits.unsigned_abs() as usize),
-        ..0 => format!("{value:.0}"),
-        _ => format!("{value:.3e}"),
-    }
 }
 
 /// Reads recordings of which at least one is needed.

@@ -20,7 +20,7 @@ crate::variables::variables! {
     /// Thesis eqs. 3.4–3.5; n = 3.5, b = 1.0877 m, θ₀ = 25.7° from section 4.3.3.
     pub struct Muscle in "muscle." as Tunable {
         /// Which static force model is used
-        force_model: ForceModelName = ForceModelName::VirtualArea, ONE, (1.0..=2.0);
+        force_model: ForceModelName = ForceModelName::VirtualArea, ONE, (ForceModelName::NUMBERS);
         /// Length at rest
         rest_length: f64 = 0.980_101_476, METRE, (0.02..=10.0);
         /// Length of one thread of the braid
@@ -73,6 +73,7 @@ macro_rules! force_models {
         impl ForceModelName {
             /// All choices, in the order of their numbers.
             pub const CHOICES: &'static [Choice] = &[$(Choice { name: $name, description: $description },)*];
+            const NUMBERS: std::ops::RangeInclusive<f64> = 1.0..=Self::CHOICES.len() as f64;
         }
 
         impl Scalar for ForceModelName {
@@ -93,6 +94,9 @@ macro_rules! force_models {
         }
 
         impl ForceModels {
+            /// The groups of parameters: one per model.
+            pub const GROUPS: &'static [&'static str] = &[$(stringify!($field),)*];
+
             /// The model that is chosen.
             #[inline]
             fn chosen(&self, name: ForceModelName) -> &dyn ForceModel {
