@@ -34,6 +34,8 @@ pub mod package;
 pub mod plot;
 #[cfg(feature = "tool")]
 pub mod simulation;
+#[cfg(feature = "tool")]
+pub mod ssp;
 
 pub use error::{Error, Result};
 

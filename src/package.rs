@@ -5,7 +5,7 @@ use crate::model::{Interface, models};
 use crate::model_description::model_description;
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Kind};
-use crate::{Error, Result};
+use crate::{Error, Result, ssp};
 use minijinja::context;
 use rayon::prelude::*;
 use std::io::{Cursor, Write};
@@ -87,7 +87,7 @@ pub fn fmu(interface: &Interface, parameters: &Parameters, libraries: &[Library]
     zip(&files)
 }
 
-fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
+pub(crate) fn zip(files: &[(String, Vec<u8>)]) -> Vec<u8> {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
@@ -179,16 +179,19 @@ pub(crate) fn short(value: f64) -> String {
     }
 }
 
-/// Writes the FMUs of all models into a folder and returns their paths.
+/// Writes the FMUs of all models, and the closed loop made of them, into a folder and returns their paths.
 ///
 /// # Errors
 /// [`Error::Io`]; no FMU is then half-written.
 pub fn export(parameters: &Parameters, libraries: &[Library], folder: &Path) -> Result<Vec<PathBuf>> {
     let interfaces: Vec<_> = models().iter().map(|model| model.interface()).collect();
-    let files = interfaces
-        .into_par_iter()
-        .map(|interface| (folder.join(format!("{}.fmu", interface.name)), fmu(interface, parameters, libraries)))
-        .collect();
+    let fmus = || {
+        let named = |interface: &Interface| folder.join(format!("{}.fmu", interface.name));
+        interfaces.par_iter().map(|interface| (named(interface), fmu(interface, parameters, libraries))).collect()
+    };
+    let system = || (folder.join(ssp::FILE_NAME), ssp::closed_loop(parameters, libraries));
+    let (mut files, system): (Vec<_>, _) = rayon::join(fmus, system);
+    files.push(system);
     write_whole(files)
 }
 

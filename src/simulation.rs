@@ -162,15 +162,21 @@ impl ClosedLoop {
     }
 }
 
+/// The parameters with the initial pressure at which the load hangs still where the reference starts.
+pub fn at_rest_on_reference(parameters: &Parameters) -> Parameters {
+    let mut parameters = *parameters;
+    let weight = parameters.load.mass * GRAVITY;
+    parameters.initial.gauge_pressure = holding_pressure(&parameters, parameters.reference.start, weight).max(0.0);
+    parameters
+}
+
 /// Simulates reference, controller and muscle for `duration` s, exchanging signals every `step` s; the load starts at
 /// rest where the reference starts.
 ///
 /// # Errors
 /// As [`replay`].
 pub fn closed_loop(parameters: &Parameters, step: f64, duration: f64) -> Result<ClosedLoop> {
-    let mut parameters = *parameters;
-    let weight = parameters.load.mass * GRAVITY;
-    parameters.initial.gauge_pressure = holding_pressure(&parameters, parameters.reference.start, weight).max(0.0);
+    let parameters = at_rest_on_reference(parameters);
     let mut reference = Simulator::<ReferenceTrajectory>::new(parameters);
     let mut controller = Simulator::<PidFeedForward>::new(parameters);
     let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
