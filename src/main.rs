@@ -174,27 +174,26 @@ fn progress(pieces: usize) -> ProgressBar {
 
 fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
     let mut files = vec![(out.join("simulated.csv"), report::simulated_csv(&[("simulated", parameters)], recordings)?)];
-    let mut rows = Vec::new();
+    let (mut rows, mut errors) = (Vec::new(), Vec::new());
     for recording in recordings {
-        let stem = Path::new(&recording.name()).with_extension("").display().to_string();
+        let (name, stem) = (recording.name(), Path::new(&recording.name()).with_extension("").display().to_string());
         for (k, svg) in report::recording_plots(parameters, parameters, recording)?.into_iter().enumerate() {
             files.push((out.join(format!("{stem}-{}.svg", k + 1)), svg.into_bytes()));
         }
         let replay = replay(parameters, recording)?;
         for signal in OUTPUTS {
             if let (Some(measured), Some(simulated)) = (recording.get(signal), replay.get(signal)) {
-                rows.push(vec![
-                    ("recording", recording.name()),
-                    ("signal", signal.name().to_owned()),
-                    ("rms", format!("{:.6}", report::rms_difference(measured, simulated))),
-                    ("unit", signal.unit().to_owned()),
-                ]);
+                let rms = report::rms_difference(measured, simulated);
+                let (signal, unit) = (signal.name(), signal.unit());
+                errors.push(json!({ "recording": name, "signal": signal, "rms": rms, "unit": unit }));
+                let texts = [name.clone(), signal.to_owned(), format!("{rms:.3e}"), unit.to_owned()];
+                rows.push(["recording", "signal", "rms", "unit"].into_iter().zip(texts).collect());
             }
         }
     }
     let files = package::write_whole(files)?;
-    let Answer { text, json } = table(rows);
-    Ok(Answer { text: format!("{text}{}", listed(&files)), json: json!({ "errors": json, "files": files }) })
+    let text = format!("{}{}", table(rows).text, listed(&files));
+    Ok(Answer { text, json: json!({ "errors": errors, "files": files }) })
 }
 
 fn listed(files: &[PathBuf]) -> String {

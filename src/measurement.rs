@@ -109,6 +109,7 @@ impl Recording {
                 }
             }
             check_time(path, line, signals.get(&Time))?;
+            check_mass(path, line, signals.get(&LoadMass))?;
         }
         Self { path: path.to_owned(), time: signals.remove(&Time).unwrap_or_default(), signals, notes }.checked()
     }
@@ -128,17 +129,8 @@ impl Recording {
         if self.time.len() < FEWEST_SAMPLES {
             return Err(problem("fewer than 10 samples: record longer, or check the separator (a comma is needed)"));
         }
-        if let Some(masses) = self.signals.get(&LoadMass) {
-            let mut present = masses.iter().copied().filter(|mass| !mass.is_nan());
-            let first = present.next().ok_or_else(|| problem("column `load_mass` is empty"))?;
-            if first <= 0.0 {
-                return Err(problem(&format!(
-                    "column `load_mass` is {first} kg; a hanging load is heavier than nothing"
-                )));
-            }
-            if present.any(|mass| mass != first) {
-                return Err(problem("column `load_mass` changes: split the file into one recording per load"));
-            }
+        if self.signals.contains_key(&LoadMass) && self.load_mass().is_none() {
+            return Err(problem("column `load_mass` is empty"));
         }
         let missing = |signal: Signal| self.get(signal).is_none_or(|values| values.iter().all(|v| v.is_nan()));
         let complaint = if self.load_mass().is_some() {
@@ -260,6 +252,21 @@ fn check_time(path: &Path, line: u64, time: Option<&Vec<f64>>) -> Result<()> {
     }
 }
 
+fn check_mass(path: &Path, line: u64, masses: Option<&Vec<f64>>) -> Result<()> {
+    let fail = |problem: String| {
+        Err(Error::Csv { path: path.to_owned(), line, column: Some("load_mass".to_owned()), problem })
+    };
+    let Some([earlier @ .., last]) = masses.map(Vec::as_slice) else { return Ok(()) };
+    match earlier.iter().find(|mass| !mass.is_nan()) {
+        _ if last.is_nan() => Ok(()),
+        _ if *last <= 0.0 => fail(format!("{last} kg; a hanging load is heavier than nothing")),
+        Some(first) if first != last => {
+            fail(format!("the load changes from {first} kg to {last} kg: split the file into one recording per load"))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn csv_error(path: &Path, error: &csv::Error) -> Error {
     let line = error.position().map_or(1, csv::Position::line);
     let problem = match error.kind() {
@@ -332,8 +339,8 @@ mod tests {
                 rows(header, |k| if k == 2 { "2,abc,1,20".into() } else { row(k) }),
                 "r.csv: line 4, column `command [V]`: `abc`",
             ),
-            (rows(header, |k| format!("{k},1,0.1,-5")), "r.csv: column `load_mass` is -5 kg"),
-            (rows(header, |k| format!("{k},1,0.1,{}", 20 + k)), "r.csv: column `load_mass` changes"),
+            (rows(header, |k| format!("{k},1,0.1,-5")), "r.csv: line 2, column `load_mass`: -5 kg"),
+            (rows(header, |k| format!("{k},1,0.1,{}", 20 + k)), "r.csv: line 3, column `load_mass`: the load changes"),
             (rows("time [s],command [V]", |k| format!("{k},1")), "r.csv: without `load_mass` the motion is prescribed"),
             ("time [s],command [V]\n".to_owned(), "r.csv: fewer than 10 samples"),
         ];

@@ -151,10 +151,12 @@ pub fn diagnose(
     let weighted = |rms: fn(&SignalErrors) -> f64| {
         signals.iter().map(|errors| (rms(errors) / errors.noise_rms).powi(2)).sum::<f64>().sqrt()
     };
+    let (before, after) = (weighted(|e| e.nominal_rms), weighted(|e| e.extended_rms));
+    let improvement = if before > 0.0 { 1.0 - after / before } else { 0.0 };
     Ok(Diagnosis {
         verdict: chosen.verdict,
         causes: chosen.best.iter().filter_map(|best| best.cause(chosen.alternatives.clone())).collect(),
-        improvement: 1.0 - weighted(|e| e.extended_rms) / weighted(|e| e.nominal_rms),
+        improvement,
         signals,
         held_out: data.held_out(),
         ranking: chosen.ranking,

@@ -12,6 +12,8 @@ const TRAINING_SHARE: f64 = 0.6;
 /// Structural error of a nominal model beyond its coefficients, as a share of the declared tolerance and of the span of
 /// the signal: a polynomial is never quite the muscle.
 const STRUCTURE_SHARE: f64 = 0.2;
+/// Fewest samples of a recording from which anything can be concluded.
+const FEWEST_SAMPLES: usize = 50;
 /// Length of a block in s: errors of different blocks count as independent.
 const BLOCK: f64 = 2.0;
 
@@ -40,8 +42,12 @@ impl<'a> Data<'a> {
     /// Looks at recordings before any fit.
     ///
     /// # Errors
-    /// [`Error::Recording`] where no signal was measured that the simulation gives.
+    /// [`Error::Recording`] where a recording is too short, or no signal was measured that the simulation gives.
     pub fn new(recordings: &'a [Recording], nominal: &Parameters, tolerance: f64) -> Result<Self> {
+        if let Some(short) = recordings.iter().find(|recording| recording.time.len() < FEWEST_SAMPLES) {
+            let problem = format!("too short for a diagnosis: it takes at least {FEWEST_SAMPLES} samples");
+            return Err(Error::Recording { path: short.path.clone(), problem });
+        }
         let mut noise = BTreeMap::new();
         let mut scale = BTreeMap::new();
         for signal in OUTPUTS {
@@ -54,7 +60,9 @@ impl<'a> Data<'a> {
             if measured.is_empty() {
                 continue;
             }
-            let level = rms(&measured.iter().map(|values| noise_rms(values)).collect::<Vec<_>>());
+            // No sensor is better than a millionth of what it shows.
+            let finest = 1e-6 * measured.iter().flat_map(|v| v.iter()).fold(1e-6, |a: f64, v| a.max(v.abs()));
+            let level = rms(&measured.iter().map(|values| noise_rms(values)).collect::<Vec<_>>()).max(finest);
             let structure = STRUCTURE_SHARE * tolerance * span(&measured);
             noise.insert(signal, level);
             scale.insert(signal, level.hypot(structure));
@@ -194,7 +202,7 @@ pub fn noise_rms(values: &[f64]) -> f64 {
     let quantum = steps.first().copied().unwrap_or(0.0);
     // 1.4826 makes a median deviation a standard deviation; the bend of white noise has √6 of it.
     let scatter = 1.4826 * median / 6.0_f64.sqrt();
-    scatter.max(quantum / 12.0_f64.sqrt()).max(f64::MIN_POSITIVE)
+    scatter.max(quantum / 12.0_f64.sqrt())
 }
 
 fn rms(values: &[f64]) -> f64 {
@@ -233,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_signal_has_hardly_any_noise() {
-        assert!(noise_rms(&[1.0; 50]) < 1e-300);
+    fn a_constant_signal_has_no_noise() {
+        assert_eq!(noise_rms(&[1.0; 50]), 0.0);
     }
 }

@@ -185,7 +185,7 @@ def test_binary_alone_exports(sinew, tmp_path):
     alone = shutil.copy(sinew, tmp_path / "empty")
     printed = run(alone, "export", cwd=tmp_path / "empty", env={}).stdout
     files = sorted(path.name for path in (tmp_path / "empty").iterdir())
-    assert files == sorted(["sinew", *(f"{model}.fmu" for model in MODELS)])
+    assert files == sorted(["sinew", "ClosedLoop.ssp", *(f"{model}.fmu" for model in MODELS)])
     assert all(f"{model}.fmu" in printed for model in MODELS)
 
 

@@ -177,7 +177,7 @@ fn values_that_cannot_be_are_refused_by_name_and_none_of_the_call_is_set() {
     let before = fmu.outputs();
     let mass = fmu.reference("load.mass");
     for (name, value, expected) in [
-        ("valve.command", f64::NAN, "`valve.command` is NaN V, allowed is -inf to inf V"),
+        ("valve.command", f64::NAN, "`valve.command` is NaN; it must be a finite number"),
         ("load.mass", f64::INFINITY, "`load.mass` is inf kg, allowed is 0.001 to 100000 kg"),
         ("load.mass", 0.0, "`load.mass` is 0 kg, allowed is 0.001 to 100000 kg"),
         ("muscle.force", 1.0, "`muscle.force` is not an input or a parameter"),

@@ -156,7 +156,7 @@ fn a_diverged_step_leaves_the_last_good_state() {
     assert_eq!(fmu.step(0.1, 0.1), Status::Discard);
     let (status, category, text) = fmu.messages.take().remove(0);
     assert_eq!((status, category.as_str()), (Status::Discard, "logStatusError"));
-    assert!(text.starts_with("fmi2DoStep: the simulation diverged at "), "{text}");
+    assert!(text.starts_with("fmi2DoStep: the simulation diverged by "), "{text}");
     assert!(text.ends_with("the values of the last good step can still be read"), "{text}");
 
     assert_eq!(fmu.outputs(), good);
