@@ -5,8 +5,9 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use libloading::{Library, Symbol};
-use sinew::model::{Simulator, models};
+use sinew::model::Simulator;
 use sinew::model_description::guid;
+use sinew::models::models;
 use sinew::package::EMBEDDED_LIBRARY;
 use sinew::parameters::Parameters;
 use sinew::plant::PneumaticMuscle;

@@ -1,8 +1,9 @@
 //! The main job in one go, on recordings that ship with the program.
 
 use crate::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, diagnose, report};
+use crate::export;
 use crate::measurement::Recording;
-use crate::package::{self, Library};
+use crate::package::Library;
 use crate::parameters::Parameters;
 use crate::plot::{Curve, plot};
 use crate::simulation::{ClosedLoop, closed_loop};
@@ -47,8 +48,8 @@ pub fn run(folder: &Path, done: &(dyn Fn(&str) + Sync)) -> Result<Demo> {
     }
     let residual = report::residual_plot(&nominal, &diagnosis.extended, &recordings[1])?;
     files.extend(residual.map(|svg| (folder.join("residual.svg"), svg.into_bytes())));
-    let mut written = package::export(&nominal, &libraries, &folder.join("nominal"))?;
-    written.extend(package::write_whole(files)?);
+    let mut written = export::export(&nominal, &libraries, &folder.join("nominal"))?;
+    written.extend(export::write_whole(files)?);
     Ok(Demo { closed_loop, diagnosis, files: written })
 }
 

@@ -2,7 +2,7 @@
 //!
 //! In the order data flows: [`variables`] declares what there is; [`muscle`], [`valve`], [`load`] and [`effects`] are the
 //! physics; [`plant`], [`controller`] and [`mod@reference`] put it together; [`model`] steps it and [`mod@model_description`] describes
-//! it. With the feature `tool`, [`package`] makes FMUs, [`measurement`] reads recordings, [`simulation`] replays them and
+//! it; [`models`] lists them. With the feature `tool`, [`package`] makes FMUs and [`mod@export`] writes them, [`measurement`] reads recordings, [`simulation`] replays them and
 //! [`diagnosis`] says what the model gets wrong.
 
 pub mod error;
@@ -14,6 +14,7 @@ pub mod integrator;
 pub mod load;
 pub mod model;
 pub mod model_description;
+pub mod models;
 pub mod muscle;
 pub mod parameters;
 pub mod plant;
@@ -24,6 +25,8 @@ pub mod valve;
 pub mod demo;
 #[cfg(feature = "tool")]
 pub mod diagnosis;
+#[cfg(feature = "tool")]
+pub mod export;
 #[cfg(feature = "tool")]
 pub mod least_squares;
 #[cfg(feature = "tool")]

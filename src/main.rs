@@ -6,11 +6,11 @@ use serde_json::{Value, json};
 use sinew::diagnosis::{self, Diagnosis, diagnose, report};
 use sinew::effects::Effects;
 use sinew::measurement::Recording;
-use sinew::model::models;
+use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
 use sinew::simulation::{OUTPUTS, replay};
-use sinew::{Result, demo, package};
+use sinew::{Result, demo, export, package};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -156,7 +156,7 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<Answer> {
     match command {
-        Command::Export { parameters, out, libraries } => export(&parameters.load()?, &out, &libraries),
+        Command::Export { parameters, out, libraries } => export_fmus(&parameters.load()?, &out, &libraries),
         Command::Simulate { recordings, parameters, out } => simulate(&parameters.load()?, &recordings.read()?, &out),
         Command::Diagnose { recordings, parameters, tolerance, out } => {
             run_diagnosis(&parameters.load()?, &recordings.read()?, tolerance, &out)
@@ -191,7 +191,7 @@ fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Re
             }
         }
     }
-    let files = package::write_whole(files)?;
+    let files = export::write_whole(files)?;
     let text = format!("{}{}", table(rows).text, listed(&files));
     Ok(Answer { text, json: json!({ "errors": errors, "files": files }) })
 }
@@ -208,7 +208,7 @@ fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f
     })?;
     bar.finish_and_clear();
     let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
-    let files = package::write_whole(files)?;
+    let files = export::write_whole(files)?;
     Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), json: report::to_json(&found) })
 }
 
@@ -250,8 +250,8 @@ fn run_demo(out: &Path) -> Result<Answer> {
     Ok(Answer { text, json: json!({ "files": made.files, "diagnosis": report::to_json(&made.diagnosis) }) })
 }
 
-fn export(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {
-    let files = package::export(parameters, &package::libraries(libraries)?, out)?;
+fn export_fmus(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {
+    let files = export::export(parameters, &package::libraries(libraries)?, out)?;
     let paths: Vec<_> = files.iter().map(|path| path.display().to_string()).collect();
     Ok(Answer { text: paths.join("\n"), json: json!({ "files": paths }) })
 }

@@ -447,31 +447,6 @@ impl<S: Registered> Model for Simulator<S> {
     }
 }
 
-macro_rules! models {
-    ($($System:ty,)*) => {
-        $(
-            impl Registered for $System {
-                fn interface() -> &'static Interface {
-                    static INTERFACE: std::sync::LazyLock<Interface> = std::sync::LazyLock::new(Interface::of::<$System>);
-                    &INTERFACE
-                }
-            }
-        )*
-
-        /// One fresh simulation of every model that is exported as an FMU, with default parameters.
-        pub fn models() -> Vec<Box<dyn Model>> {
-            vec![$(Box::new(Simulator::<$System>::new(Parameters::default())),)*]
-        }
-    };
-}
-
-models! {
-    crate::plant::PneumaticMuscle,
-    crate::plant::PneumaticActuator,
-    crate::controller::PidFeedForward,
-    crate::reference::ReferenceTrajectory,
-}
-
 impl Variable {
     /// Full name, as a function that can be passed on.
     fn name(variable: &'static Variable) -> &'static str {

@@ -1,15 +1,13 @@
 //! FMUs as files: description, library, documentation and parameters in a zip whose bytes depend on nothing else.
 
 use crate::effects::Effects;
-use crate::model::{Interface, models};
+use crate::model::Interface;
 use crate::model_description::model_description;
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Kind};
-use crate::{Error, Result, ssp};
+use crate::{Error, Result};
 use minijinja::context;
-use rayon::prelude::*;
 use std::io::{Cursor, Write};
-use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
@@ -177,46 +175,4 @@ pub(crate) fn short(value: f64) -> String {
         ..0 => format!("{value:.0}"),
         _ => format!("{value:.3e}"),
     }
-}
-
-/// Writes the FMUs of all models, and the closed loop made of them, into a folder and returns their paths.
-///
-/// # Errors
-/// [`Error::Io`]; no FMU is then half-written.
-pub fn export(parameters: &Parameters, libraries: &[Library], folder: &Path) -> Result<Vec<PathBuf>> {
-    let interfaces: Vec<_> = models().iter().map(|model| model.interface()).collect();
-    let fmus = || {
-        let named = |interface: &Interface| folder.join(format!("{}.fmu", interface.name));
-        interfaces.par_iter().map(|interface| (named(interface), fmu(interface, parameters, libraries))).collect()
-    };
-    let system = || (folder.join(ssp::FILE_NAME), ssp::closed_loop(parameters, libraries));
-    let (mut files, system): (Vec<_>, _) = rayon::join(fmus, system);
-    files.push(system);
-    write_whole(files)
-}
-
-/// Writes files whole or not at all, making their folders: each is written under another name first and renamed when
-/// all are complete.
-///
-/// # Errors
-/// [`Error::Io`] with the path that could not be written.
-pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>) -> Result<Vec<PathBuf>> {
-    let mut complete = Vec::new();
-    for (path, bytes) in files {
-        let io = |source| Error::Io { path: path.clone(), source };
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder).map_err(io)?;
-        let mut builder = tempfile::Builder::new();
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // the umask narrows it
-        let mut file = builder.tempfile_in(folder).map_err(io)?;
-        file.write_all(&bytes).map_err(io)?;
-        complete.push((path, file));
-    }
-    let mut written = Vec::new();
-    for (path, file) in complete {
-        file.persist(&path).map_err(|error| Error::Io { path: path.clone(), source: error.error })?;
-        written.push(path);
-    }
-    Ok(written)
 }

@@ -3,7 +3,8 @@
 //! Importers differ in what they honour, so the description keeps to what all of them do: a flat system, the usual name space
 //! prefixes, only connected connectors, SI units, and every value of the parameter sets also as the FMU's start value.
 
-use crate::model::{Interface, models};
+use crate::model::Interface;
+use crate::models::models;
 use crate::package::{Library, fmu, zip};
 use crate::parameters::Parameters;
 use crate::simulation::at_rest_on_reference;

@@ -2,8 +2,9 @@
 
 use proptest::prelude::*;
 use sinew::effects::Effects;
-use sinew::model::{Model, models};
+use sinew::model::Model;
 use sinew::model_description::model_description;
+use sinew::models::models;
 use sinew::parameters::Parameters;
 use sinew::variables::Declared;
 use std::path::{Path, PathBuf};

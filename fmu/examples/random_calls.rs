@@ -20,7 +20,7 @@ use host::Api;
 use libloading::Library;
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
-use sinew::model::models;
+use sinew::models::models;
 
 const CALLS: usize = 10_000;
 /// Calls after which a host frees its instance and takes a new one.

@@ -1,6 +1,6 @@
 //! The library inside every FMU: it knows FMI, not muscles.
 //!
-//! One library serves all models of [`sinew::model::models`]; the GUID that the host passes says which.
+//! One library serves all models of [`sinew::models::models`]; the GUID that the host passes says which.
 //!
 //! - [`fmi2`] is the C interface of FMI 2.0 for co-simulation, and the only place with `unsafe` code. Another version
 //!   of FMI would be another file beside it.

@@ -3,7 +3,7 @@
 use super::{Diagnosis, FittedParameter, Verdict};
 use crate::Result;
 use crate::measurement::{Recording, Signal};
-use crate::model::models;
+use crate::models::models;
 use crate::package::{Library, fmu, render, short};
 use crate::parameters::Parameters;
 use crate::plot::{Curve, plot};

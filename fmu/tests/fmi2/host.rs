@@ -1,8 +1,9 @@
 //! A host of FMUs, small and strict.
 
 use libloading::Library;
-use sinew::model::{Interface, models};
+use sinew::model::Interface;
 use sinew::model_description::guid;
+use sinew::models::models;
 use sinew::parameters::Parameters;
 use sinew_fmu::fmi2::*;
 use sinew_fmu::log::Status;
