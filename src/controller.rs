@@ -39,7 +39,7 @@ crate::variables::variables! {
     /// Feed-forward of the pressure that the reference needs.
     ///
     /// # Model
-    /// p_r = (M (g + k_a d²x_r/dt²) − F_e(x_r)) / A(x_r), u_ff = (p_r + k_v/ω dp_r/dt) / K_v: elastic force F_e and
+    /// p_r = (M (g + k_a d²x_r/dt²) − F_e(x_r)) / A(x_r), kept within what the limits of the command allow; u_ff = (p_r + k_v/ω dp_r/dt) / K_v: elastic force F_e and
     /// virtual area A of the muscle's force model at the setpoint x_r; `inertia` k_a; `valve_lag` k_v.
     ///
     /// # Reference
@@ -86,7 +86,11 @@ fn reference_pressure(parameters: &Parameters, setpoint: f64, acceleration: f64)
 
 /// Command in V that makes the valve follow the pressure that the reference needs.
 pub fn feed_forward(parameters: &Parameters, inputs: &ControllerInputs) -> f64 {
-    let pressure_at = |setpoint| reference_pressure(parameters, setpoint, inputs.setpoint_acceleration);
+    let Controller { minimum_command, maximum_command, .. } = parameters.controller;
+    let (lowest, highest) = (parameters.valve.gain * minimum_command, parameters.valve.gain * maximum_command);
+    // A setpoint that the muscle cannot reach may ask for any pressure or none (NaN): `max` makes that the lowest.
+    let pressure_at =
+        |setpoint| reference_pressure(parameters, setpoint, inputs.setpoint_acceleration).max(lowest).min(highest);
     let pressure = pressure_at(inputs.setpoint);
     let way = 1e-5 * parameters.muscle.rest_length;
     let slope = (pressure_at(inputs.setpoint + way) - pressure_at(inputs.setpoint - way)) / (2.0 * way);
@@ -170,8 +174,8 @@ impl System for PidFeedForward {
         let Parameters { controller, .. } = parameters;
         let command = unlimited_command(parameters, inputs, state);
         ControllerOutputs {
-            // Not `clamp`: it panics where a user has set the limits the wrong way round.
-            command: command.min(controller.maximum_command).max(controller.minimum_command),
+            // Not `clamp`: it panics where a user has set the limits the wrong way round, and keeps NaN.
+            command: command.max(controller.minimum_command).min(controller.maximum_command),
             feed_forward: feed_forward(parameters, inputs),
             control_error: inputs.setpoint - inputs.measured_contraction,
         }

@@ -19,6 +19,16 @@ pub enum Error {
         /// Unit of all three.
         unit: &'static str,
     },
+    /// A number that stands for none of the choices of an enumeration.
+    #[error("`{variable}` is {value}; its choices are numbered from 1 to {choices}")]
+    NoSuchChoice {
+        /// Full name of the variable.
+        variable: String,
+        /// The value that was refused.
+        value: f64,
+        /// How many choices there are.
+        choices: usize,
+    },
     /// A value that is no number, for a variable that takes any.
     #[error("`{variable}` is {value}; it must be a finite number")]
     NotFinite {
@@ -87,6 +97,12 @@ pub enum Error {
         time: f64,
         /// The first state that left its range.
         variable: &'static str,
+    },
+    /// An integration that would keep its caller waiting.
+    #[error("the simulation got no further than {time} s: the step is too long, or the parameters make it too stiff")]
+    TooManySteps {
+        /// Simulated time that was reached, s.
+        time: f64,
     },
     /// Saved model state that this model cannot read.
     #[error("the saved state cannot be restored: {problem}")]

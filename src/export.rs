@@ -34,8 +34,11 @@ pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>) -> Result<Vec<PathBuf>> {
     let mut complete = Vec::new();
     for (path, bytes) in files {
         let io = |source| Error::Io { path: path.clone(), source };
+        if path.is_dir() {
+            return Err(io(std::io::Error::other("there is a folder of this name: remove it or choose another --out")));
+        }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder).map_err(io)?;
+        std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
         let mut builder = tempfile::Builder::new();
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // the umask narrows it

@@ -36,8 +36,8 @@ const E: [f64; 7] =
 pub struct Failed {
     /// Time since the start of the interval, s.
     pub after: f64,
-    /// Index of the state to blame.
-    pub state: usize,
+    /// Index of the state to blame; `None` where there were too many steps.
+    pub state: Option<usize>,
 }
 
 /// Advances `state` over `duration` seconds.
@@ -80,10 +80,10 @@ pub fn advance<const N: usize>(
             return Ok(());
         }
         if *step < SMALLEST_STEP {
-            return Err(Failed { after: time, state: worst });
+            return Err(Failed { after: time, state: Some(worst) });
         }
     }
-    Err(Failed { after: time, state: 0 })
+    Err(Failed { after: time, state: None })
 }
 
 #[inline]

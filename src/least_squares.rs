@@ -55,6 +55,7 @@ const SMALL_DECREASE: f64 = 1e-6;
 /// Minimises the sum of squares of `residuals`, which gives `None` where it cannot be computed.
 pub fn fit(residuals: &(impl Fn(&[f64]) -> Option<Vec<f64>> + Sync), free: &[Free]) -> Fit {
     let mut parameters: Vec<f64> = free.iter().map(|f| f.start.clamp(f.lower, f.upper)).collect();
+    let residuals = &|parameters: &[f64]| residuals(parameters).filter(|all| all.iter().all(|r| r.is_finite()));
     let Some(mut current) = residuals(&parameters) else {
         return Fit {
             parameters,

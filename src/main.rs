@@ -5,11 +5,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use sinew::diagnosis::{self, Diagnosis, diagnose, report};
 use sinew::effects::Effects;
-use sinew::measurement::Recording;
+use sinew::measurement::{self, Recording};
 use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
-use sinew::simulation::{OUTPUTS, replay};
+use sinew::simulation::{OUTPUTS, replay, rms_difference};
 use sinew::{Result, demo, export, package};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -105,7 +105,7 @@ struct RecordingSource {
 
 impl RecordingSource {
     fn read(&self) -> Result<Vec<Recording>> {
-        let recordings = report::read_all(&self.files, &self.renamed)?;
+        let recordings = measurement::read_all(&self.files, &self.renamed)?;
         for recording in &recordings {
             recording.notes.iter().for_each(|note| eprintln!("note: {}: {note}", recording.name()));
         }
@@ -114,8 +114,10 @@ impl RecordingSource {
 }
 
 fn renaming(text: &str) -> std::result::Result<(String, String), String> {
-    let (theirs, ours) = text.split_once('=').ok_or("write THEIRS=OURS, as in \"p_mus=gauge_pressure [bar]\"")?;
-    Ok((theirs.to_owned(), ours.to_owned()))
+    match text.split_once('=') {
+        Some((theirs, ours)) if !theirs.is_empty() && !ours.is_empty() => Ok((theirs.to_owned(), ours.to_owned())),
+        _ => Err("write THEIRS=OURS, as in \"p_mus=gauge_pressure [bar]\"".to_owned()),
+    }
 }
 
 fn tolerance(text: &str) -> std::result::Result<f64, String> {
@@ -176,14 +178,15 @@ fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Re
     let mut files = vec![(out.join("simulated.csv"), report::simulated_csv(&[("simulated", parameters)], recordings)?)];
     let (mut rows, mut errors) = (Vec::new(), Vec::new());
     for recording in recordings {
-        let (name, stem) = (recording.name(), Path::new(&recording.name()).with_extension("").display().to_string());
+        let name = recording.name();
+        let stem = name.trim_end_matches(".csv").replace(['/', '\\'], "_");
         for (k, svg) in report::recording_plots(parameters, parameters, recording)?.into_iter().enumerate() {
             files.push((out.join(format!("{stem}-{}.svg", k + 1)), svg.into_bytes()));
         }
         let replay = replay(parameters, recording)?;
         for signal in OUTPUTS {
             if let (Some(measured), Some(simulated)) = (recording.get(signal), replay.get(signal)) {
-                let rms = report::rms_difference(measured, simulated);
+                let Some(rms) = rms_difference(measured, simulated) else { continue };
                 let (signal, unit) = (signal.name(), signal.unit());
                 errors.push(json!({ "recording": name, "signal": signal, "rms": rms, "unit": unit }));
                 let texts = [name.clone(), signal.to_owned(), format!("{rms:.3e}"), unit.to_owned()];
@@ -209,13 +212,15 @@ fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f
     bar.finish_and_clear();
     let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
     let files = export::write_whole(files)?;
-    Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), json: report::to_json(&found) })
+    let mut json = report::to_json(&found);
+    json["files"] = json!(files);
+    Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), json })
 }
 
 /// A diagnosis in a few lines.
 fn told(found: &Diagnosis) -> String {
     let mut text = format!("{}\n", report::headline(found));
-    text += &format!("Held-out error reduced by {:.0} % ({}).\n", 100.0 * found.improvement, found.held_out);
+    text += &format!("{}\n", report::gain(found));
     for signal in &found.signals {
         text += &format!(
             "  {:<15} nominal {:.3e}, extended {:.3e}, noise {:.3e} {}\n",

@@ -58,6 +58,8 @@ impl Signal {
 pub struct Recording {
     /// Where it was read from.
     pub path: PathBuf,
+    /// What people call it.
+    name: String,
     /// Time in s, strictly increasing, shape `(n_samples,)`.
     pub time: Vec<f64>,
     /// The other signals in SI units, each of shape `(n_samples,)`; NaN where a sample is missing.
@@ -87,6 +89,7 @@ impl Recording {
     pub fn parse(text: &[u8], path: &Path, renamed: &[(String, String)]) -> Result<Self> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
         let headers = reader.headers().map_err(|error| csv_error(path, &error))?.clone();
+        check_headers(path, &headers, renamed)?;
         let mut notes = Vec::new();
         let columns = headers
             .iter()
@@ -98,6 +101,10 @@ impl Recording {
                 let problem = "there are two such columns: rename or remove one".to_owned();
                 return Err(column.error(path, 1, problem));
             }
+        }
+        if !signals.contains_key(&Time) {
+            let problem = "there is no column `time [s]`".to_owned();
+            return Err(Error::Csv { path: path.to_owned(), line: 1, column: None, problem });
         }
         for row in reader.records() {
             let row = row.map_err(|error| csv_error(path, &error))?;
@@ -111,7 +118,9 @@ impl Recording {
             check_time(path, line, signals.get(&Time))?;
             check_mass(path, line, signals.get(&LoadMass))?;
         }
-        Self { path: path.to_owned(), time: signals.remove(&Time).unwrap_or_default(), signals, notes }.checked()
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let time = signals.remove(&Time).unwrap_or_default();
+        Self { path: path.to_owned(), name, time, signals, notes }.checked()
     }
 
     /// Refuses what no use could be made of, and drops rows without a new time.
@@ -180,10 +189,31 @@ impl Recording {
         self.get(LoadMass)?.iter().copied().find(|mass| !mass.is_nan())
     }
 
-    /// File name without its folder, for people.
+    /// File name for people, with its folder only where another recording has the same.
     pub fn name(&self) -> String {
-        self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned()
+        self.name.clone()
     }
+}
+
+/// Reads several recordings and sees to it that their names differ.
+///
+/// # Errors
+/// As [`Recording::read`]; [`Error::Recording`] for a file that is given twice.
+pub fn read_all(paths: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<Recording>> {
+    for (index, path) in paths.iter().enumerate() {
+        if paths[..index].contains(path) {
+            let problem = "is given twice: a copy proves nothing about the original".to_owned();
+            return Err(Error::Recording { path: path.clone(), problem });
+        }
+    }
+    let mut recordings = paths.iter().map(|path| Recording::read(path, renamed)).collect::<Result<Vec<_>>>()?;
+    let names: Vec<String> = recordings.iter().map(Recording::name).collect();
+    for recording in &mut recordings {
+        if names.iter().filter(|name| **name == recording.name).count() > 1 {
+            recording.name = recording.path.display().to_string();
+        }
+    }
+    Ok(recordings)
 }
 
 /// A column that is understood.
@@ -239,11 +269,24 @@ fn understand(
     Ok(Some(Column { header: header.to_owned(), signal: *signal, scale, offset }))
 }
 
+/// Refuses a wrong separator and renamings of columns that are not there.
+fn check_headers(path: &Path, headers: &csv::StringRecord, renamed: &[(String, String)]) -> Result<()> {
+    let fail = |problem| Err(Error::Csv { path: path.to_owned(), line: 1, column: None, problem });
+    let only = headers.get(0).filter(|_| headers.len() == 1).unwrap_or_default();
+    if let Some(separator) = [";", "\t"].into_iter().find(|separator| only.contains(separator)) {
+        return fail(format!("the columns are separated by {separator:?}: a comma is needed"));
+    }
+    let known = |theirs: &String| headers.iter().any(|header| header.trim_start_matches('\u{feff}') == theirs);
+    match renamed.iter().find(|(theirs, _)| !known(theirs)) {
+        Some((theirs, _)) => fail(format!("there is no column `{theirs}`, which --map names")),
+        None => Ok(()),
+    }
+}
+
 fn check_time(path: &Path, line: u64, time: Option<&Vec<f64>>) -> Result<()> {
     let fail =
         |problem: String| Err(Error::Csv { path: path.to_owned(), line, column: Some("time".to_owned()), problem });
     match time.map(Vec::as_slice) {
-        None => fail("there is no column `time [s]`".to_owned()),
         Some([.., last]) if last.is_nan() => fail("the time is missing: remove the row".to_owned()),
         Some([.., before, last]) if last < before => {
             fail(format!("time runs backwards, from {before} s to {last} s: sort the rows or split the file"))

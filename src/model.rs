@@ -215,9 +215,13 @@ impl<S: System> Simulator<S> {
     /// Puts the system at its start.
     ///
     /// # Errors
-    /// As [`System::initial_state`]; nothing has changed then.
+    /// As [`System::initial_state`], and [`Error::Diverged`] for a start out of range; nothing has changed then.
     pub fn initialize(&mut self, time: f64) -> Result<()> {
-        self.state = S::initial_state(&self.parameters, &self.inputs)?;
+        let state = S::initial_state(&self.parameters, &self.inputs)?;
+        if let Some(variable) = S::left_range(&self.parameters, &state) {
+            return Err(Error::Diverged { time, variable });
+        }
+        self.state = state;
         self.time = time;
         self.step = FIRST_STEP;
         Ok(())
@@ -231,16 +235,22 @@ impl<S: System> Simulator<S> {
     /// Advances by a duration in s; the inputs move along their slopes, which are then zero.
     ///
     /// # Errors
-    /// [`Error::Diverged`]; nothing has changed then.
+    /// [`Error::Diverged`], [`Error::TooManySteps`]; nothing has changed then.
     pub fn advance(&mut self, duration: f64) -> Result<()> {
         let (mut state, mut step) = (self.state, self.step);
         let (parameters, inputs, slopes) = (&self.parameters, &self.inputs, &self.slopes);
         let rates = |after: f64, state: &S::State, rates: &mut S::State| {
             S::rates(parameters, &inputs.along(slopes, after), state, rates);
         };
-        state.advance(rates, &S::SCALE, &mut step, duration).map_err(|failed| Error::Diverged {
-            time: self.time + failed.after,
-            variable: S::STATE_NAMES.get(failed.state).copied().unwrap_or("state of an effect"),
+        state.advance(rates, &S::SCALE, &mut step, duration).map_err(|failed| {
+            let time = self.time + failed.after;
+            match failed.state {
+                Some(state) => {
+                    let variable = S::STATE_NAMES.get(state).copied().unwrap_or("state of an effect");
+                    Error::Diverged { time, variable }
+                }
+                None => Error::TooManySteps { time },
+            }
         })?;
         if let Some(variable) = S::left_range(parameters, &state) {
             return Err(Error::Diverged { time: self.time + duration, variable });

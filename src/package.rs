@@ -171,7 +171,10 @@ pub(crate) fn short(value: f64) -> String {
     #[allow(clippy::cast_possible_truncation)]
     let digits = 3 - value.abs().log10().floor() as i32;
     match digits {
-        0..=6 => format!("{value:.*}", digits.unsigned_abs() as usize),
+        0..=6 => {
+            let text = format!("{value:.*}", digits.unsigned_abs() as usize);
+            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+        }
         ..0 => format!("{value:.0}"),
         _ => format!("{value:.3e}"),
     }

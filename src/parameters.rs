@@ -136,7 +136,11 @@ impl Parameters {
             |problem| Error::ParameterFile { source_name: source_name.to_owned(), problem: Box::new(problem) };
         let mut changed = match table.get("preset") {
             Some(toml::Value::String(name)) => Self::preset(name).map_err(in_file)?,
-            _ => *self,
+            Some(other) => {
+                let (name, expected) = ("preset".to_owned(), "the name of a preset".to_owned());
+                return Err(in_file(Error::WrongKind { name, expected, found: other.type_str().to_owned() }));
+            }
+            None => *self,
         };
         for (key, value) in &table {
             if key != "preset" {
@@ -149,7 +153,7 @@ impl Parameters {
 
     fn apply_value(&mut self, name: &str, value: &toml::Value) -> Result<()> {
         match value {
-            toml::Value::Table(table) => {
+            toml::Value::Table(table) if !table.is_empty() => {
                 table.iter().try_for_each(|(key, value)| self.apply_value(&format!("{name}.{key}"), value))
             }
             toml::Value::Float(number) => self.set(name, *number),

@@ -172,11 +172,7 @@ impl System for PneumaticMuscle {
 
     fn initial_state(parameters: &Parameters, inputs: &MuscleInputs) -> Result<Self::State> {
         let (mass, gauge_pressure) = (moving_mass(parameters), parameters.initial.gauge_pressure);
-        let hanging = if mass > 0.0 {
-            equilibrium(parameters, gauge_pressure, mass * GRAVITY + inputs.external_force)
-        } else {
-            None
-        };
+        let hanging = equilibrium(parameters, gauge_pressure, mass * GRAVITY + inputs.external_force);
         let mut state = [0.0; HANGING_STATES];
         state[0] = gauge_pressure;
         state[1] = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
@@ -213,6 +209,9 @@ impl System for PneumaticMuscle {
     }
 
     fn left_range(parameters: &Parameters, state: &Self::State) -> Option<&'static str> {
+        if moving_mass(parameters) <= 0.0 {
+            return Some("load.mass with payload_mass.additional_mass");
+        }
         let length = parameters.muscle.rest_length - state[1];
         (!(0.0..=parameters.muscle.thread_length).contains(&length)).then_some("muscle.contraction")
     }

@@ -7,9 +7,9 @@ use plotters::prelude::*;
 pub struct Curve<'a> {
     /// What the legend says.
     pub label: &'a str,
-    /// Horizontal values; NaN breaks the line.
+    /// Horizontal values; NaN is left out.
     pub x: &'a [f64],
-    /// Vertical values; NaN breaks the line.
+    /// Vertical values; NaN is left out.
     pub y: &'a [f64],
     /// Position in the palette.
     pub color: usize,
@@ -52,8 +52,7 @@ fn draw(svg: &mut String, title: &str, x_label: &str, y_label: &str, curves: &[C
         .draw()?;
     for curve in curves {
         let color = PALETTE[curve.color % PALETTE.len()];
-        let drawn =
-            chart.draw_series(pieces(curve).into_iter().map(|piece| PathElement::new(piece, color.stroke_width(1))))?;
+        let drawn = chart.draw_series(LineSeries::new(points(curve), color.stroke_width(1)))?;
         drawn.label(curve.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(3)));
     }
     if curves.len() > 1 {
@@ -79,9 +78,10 @@ fn padded(values: impl Iterator<Item = f64>, above: f64) -> std::ops::Range<f64>
     low - 0.02 * size..high + above * size
 }
 
-/// The unbroken pieces of a curve, thinned where it has more points than can be seen.
-fn pieces(curve: &Curve) -> Vec<Vec<(f64, f64)>> {
-    let stride = curve.x.len().div_ceil(MOST_POINTS).max(1);
-    let points: Vec<_> = curve.x.iter().copied().zip(curve.y.iter().copied()).step_by(stride).collect();
-    points.split(|(x, y)| !(x.is_finite() && y.is_finite())).filter(|p| p.len() > 1).map(<[_]>::to_vec).collect()
+/// The points of a curve that can be drawn, thinned where there are more than can be seen.
+fn points(curve: &Curve) -> Vec<(f64, f64)> {
+    let all = curve.x.iter().copied().zip(curve.y.iter().copied());
+    let finite: Vec<_> = all.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+    let stride = finite.len().div_ceil(MOST_POINTS).max(1);
+    finite.into_iter().step_by(stride).collect()
 }

@@ -65,7 +65,7 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
         return follow::<PneumaticMuscle>(&parameters, time, inputs, shown, &[]);
     }
     let Some(command) = command else { return replay_muscle(&parameters, recording) };
-    let contraction = recording.bridged(Signal::Contraction).unwrap_or_default();
+    let contraction = true_contraction(&parameters, recording);
     let velocity = slopes(time, &contraction);
     let inputs = |k: usize| ActuatorInputs {
         command: command[k],
@@ -80,8 +80,9 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
 /// # Errors
 /// As [`replay`].
 pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
-    let of = |signal| recording.bridged(signal).unwrap_or_else(|| vec![0.0; recording.time.len()]);
-    let (pressure, contraction) = (of(Signal::GaugePressure), of(Signal::Contraction));
+    let nothing = || vec![0.0; recording.time.len()];
+    let pressure = recording.bridged(Signal::GaugePressure).unwrap_or_else(nothing);
+    let contraction = true_contraction(parameters, recording);
     let velocity = slopes(&recording.time, &contraction);
     let inputs = |k: usize| MeasuredInputs {
         gauge_pressure: pressure[k],
@@ -90,6 +91,12 @@ pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<R
     };
     let given = [Signal::Contraction, Signal::GaugePressure];
     follow::<MuscleAlone>(parameters, &recording.time, inputs, driven_readings, &given)
+}
+
+/// The contraction behind the readings of the position sensor.
+fn true_contraction(parameters: &Parameters, recording: &Recording) -> Vec<f64> {
+    let measured = recording.bridged(Signal::Contraction).unwrap_or_else(|| vec![0.0; recording.time.len()]);
+    measured.into_iter().map(|reading| parameters.effects.true_contraction(reading)).collect()
 }
 
 fn driven_readings(out: &ActuatorOutputs) -> [f64; 3] {
@@ -141,6 +148,13 @@ fn slopes(time: &[f64], values: &[f64]) -> Vec<f64> {
             covariance / t.iter().map(|t| (t - mean_t).powi(2)).sum::<f64>()
         })
         .collect()
+}
+
+/// Rms difference of the samples that both have; `None` where they have none in common.
+pub fn rms_difference(measured: &[f64], simulated: &[f64]) -> Option<f64> {
+    let differences: Vec<f64> = measured.iter().zip(simulated).map(|(m, s)| m - s).filter(|d| !d.is_nan()).collect();
+    let mean_square = differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64;
+    (!differences.is_empty()).then(|| mean_square.sqrt())
 }
 
 /// The course of a closed loop, each of shape `(n_steps + 1,)`, SI.

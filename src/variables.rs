@@ -113,11 +113,15 @@ impl Variable {
     ///
     /// # Errors
     /// [`crate::Error::OutOfRange`] when the value is not finite, below `min` or above `max`;
-    /// [`crate::Error::NotFinite`] where there are no such bounds.
+    /// [`crate::Error::NotFinite`] where there are no such bounds; [`crate::Error::NoSuchChoice`] for an enumeration.
     pub fn check(&self, value: f64) -> crate::Result<()> {
         let whole = matches!(self.kind, Kind::Real) || value.fract() == 0.0;
         if value.is_finite() && whole && (self.min..=self.max).contains(&value) {
             return Ok(());
+        }
+        if let Kind::Enumeration(_, choices) = self.kind {
+            let (variable, choices) = (self.name.to_owned(), choices.len());
+            return Err(crate::Error::NoSuchChoice { variable, value, choices });
         }
         if self.min == f64::NEG_INFINITY && self.max == f64::INFINITY {
             return Err(crate::Error::NotFinite { variable: self.name.to_owned(), value });

@@ -3,7 +3,7 @@
 use super::Cause;
 use super::residuals::{Data, HeldOut};
 use crate::effects::{Description, Effects};
-use crate::least_squares::{self, Free};
+use crate::least_squares::{self, Ended, Free};
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
 
@@ -52,7 +52,9 @@ impl Candidate {
         for name in CORRECTIONS {
             let (variable, value) = declared(nominal, name);
             let size = tolerance * value.abs();
-            free.push((variable, Free { start: value, lower: value - size, upper: value + size, typical: size }));
+            if size > 0.0 {
+                free.push((variable, Free { start: value, lower: value - size, upper: value + size, typical: size }));
+            }
         }
         for (name, start) in self.effect.map_or(&[][..], |effect| effect.free) {
             let (variable, _) = declared(nominal, name);
@@ -87,9 +89,10 @@ pub struct Fitted {
 }
 
 impl Fitted {
-    /// Fits a candidate to the samples that fits may see.
-    pub fn fit(candidate: &Candidate, nominal: &Parameters, data: &Data, tolerance: f64) -> Self {
+    /// Fits a candidate to the samples that fits may see; `None` where it cannot be simulated.
+    pub fn fit(candidate: &Candidate, nominal: &Parameters, data: &Data, tolerance: f64) -> Option<Self> {
         let free = candidate.free(nominal, tolerance);
+        let corrections = free.iter().filter(|(variable, _)| CORRECTIONS.contains(&variable.name)).count();
         let bounds: Vec<Free> = free.iter().map(|(_, free)| *free).collect();
         let with = |values: &[f64]| {
             let mut parameters = *nominal;
@@ -101,10 +104,13 @@ impl Fitted {
         let residuals = |values: &[f64]| {
             let mut residuals = data.training_residuals(&with(values))?;
             // A correction of the whole tolerance counts as one expected residual: it is allowed, not encouraged.
-            residuals.extend(bounds.iter().zip(values).take(CORRECTIONS.len()).map(|(b, v)| (v - b.start) / b.typical));
+            residuals.extend(bounds.iter().zip(values).take(corrections).map(|(b, v)| (v - b.start) / b.typical));
             Some(residuals)
         };
         let fit = least_squares::fit(&residuals, &bounds);
+        if fit.ended == Ended::NoStart {
+            return None;
+        }
         let parameters = with(&fit.parameters);
         let samples = residuals(&fit.parameters).map_or(1, |r| r.len());
         // Residuals are neither of unit variance nor independent: both widen the interval.
@@ -117,14 +123,14 @@ impl Fitted {
                 FittedParameter { name, value, low: low.max(bounds[k].lower), high: high.min(bounds[k].upper), unit }
             })
             .collect();
-        let (corrections, found) = fitted.split_at(CORRECTIONS.len());
-        Self {
+        let (corrections, found) = fitted.split_at(corrections);
+        Some(Self {
             effect: candidate.effect,
             parameters,
             corrections: corrections.to_vec(),
             found: found.to_vec(),
             held_out: data.held_out_loss(&parameters),
-        }
+        })
     }
 
     /// Name of the effect.

@@ -118,26 +118,25 @@ pub fn diagnose(
         replay(nominal, recording)?; // a model that cannot be simulated at all is the user's to mend
     }
     let data = Data::new(recordings, nominal, tolerance)?;
-    let baseline = Fitted::fit(&Candidate::corrections_only(), nominal, &data, tolerance);
+    let cannot_follow = || Error::Recording {
+        path: recordings[0].path.clone(),
+        problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
+    };
+    let baseline = Fitted::fit(&Candidate::corrections_only(), nominal, &data, tolerance).ok_or_else(cannot_follow)?;
     done("nominal");
     let candidates: Vec<Fitted> = Candidate::all()
         .iter()
-        .map(|candidate| {
+        .filter_map(|candidate| {
             let fitted = Fitted::fit(candidate, nominal, &data, tolerance);
             done(candidate.name());
             fitted
         })
         .collect();
-    let chosen = selection::select(&baseline, candidates);
+    let chosen = selection::select(&baseline, candidates, data.noise_floor());
     let extended = chosen.best.as_ref().map_or(baseline.parameters, |best| best.parameters);
     let nominal_errors = data.held_out_rms(nominal);
     let extended_errors = data.held_out_rms(&extended);
-    let (Some(nominal_errors), Some(extended_errors)) = (nominal_errors, extended_errors) else {
-        return Err(Error::Recording {
-            path: recordings[0].path.clone(),
-            problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
-        });
-    };
+    let (nominal_errors, extended_errors) = nominal_errors.zip(extended_errors).ok_or_else(cannot_follow)?;
     let signals: Vec<SignalErrors> = data
         .signals()
         .into_iter()

@@ -36,6 +36,17 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
     }
 }
 
+/// One sentence on how much smaller the error is on samples that no fit saw.
+pub fn gain(diagnosis: &Diagnosis) -> String {
+    let what = if diagnosis.causes.is_empty() {
+        "Corrections within the tolerance remove"
+    } else {
+        "The extended model removes"
+    };
+    let (share, where_from) = (100.0 * diagnosis.improvement, &diagnosis.held_out);
+    format!("{what} {share:.0} % of the error, on samples that no fit saw: {where_from}.")
+}
+
 /// `diagnosis.json`.
 pub fn to_json(diagnosis: &Diagnosis) -> Value {
     let parameters = |all: &[FittedParameter]| -> Map<String, Value> {
@@ -260,23 +271,9 @@ fn html(diagnosis: &Diagnosis, exposing: &[String], plots: &[String]) -> String 
     let page = context! {
         headline => headline(diagnosis), causes, signals, ranking, plots => plots.to_vec(), exposing => exposing.to_vec(),
         verdict => format!("{}", to_json(diagnosis)["verdict"].as_str().unwrap_or_default().replace('_', " ")),
-        improvement => format!("{:.0} %", 100.0 * diagnosis.improvement),
-        held_out => diagnosis.held_out.clone(), corrections => parameters(&diagnosis.corrections),
+        gain => gain(diagnosis),
+        corrections => parameters(&diagnosis.corrections),
         version => env!("CARGO_PKG_VERSION"),
     };
     render("report.html", include_str!("report.html"), &page)
-}
-
-/// Reads recordings of which at least one is needed.
-///
-/// # Errors
-/// As [`Recording::read`].
-pub fn read_all(paths: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<Recording>> {
-    paths.iter().map(|path| Recording::read(path, renamed)).collect()
-}
-
-/// Rms difference of the samples that both have.
-pub fn rms_difference(measured: &[f64], simulated: &[f64]) -> f64 {
-    let differences: Vec<f64> = measured.iter().zip(simulated).map(|(m, s)| m - s).filter(|d| !d.is_nan()).collect();
-    (differences.iter().map(|d| d * d).sum::<f64>() / differences.len().max(1) as f64).sqrt()
 }

@@ -7,7 +7,7 @@ use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Share of each recording, from its start, that fits see when there is only one.
+/// Share of each recording, from its start, that fits see when its end is held out.
 const TRAINING_SHARE: f64 = 0.6;
 /// Structural error of a nominal model beyond its coefficients, as a share of the declared tolerance and of the span of
 /// the signal: a polynomial is never quite the muscle.
@@ -42,40 +42,66 @@ impl<'a> Data<'a> {
     /// Looks at recordings before any fit.
     ///
     /// # Errors
-    /// [`Error::Recording`] where a recording is too short, or no signal was measured that the simulation gives.
+    /// [`Error::Recording`] where a recording is too short, or no measured signal can be judged.
     pub fn new(recordings: &'a [Recording], nominal: &Parameters, tolerance: f64) -> Result<Self> {
         if let Some(short) = recordings.iter().find(|recording| recording.time.len() < FEWEST_SAMPLES) {
             let problem = format!("too short for a diagnosis: it takes at least {FEWEST_SAMPLES} samples");
             return Err(Error::Recording { path: short.path.clone(), problem });
         }
-        let mut noise = BTreeMap::new();
-        let mut scale = BTreeMap::new();
+        let replays: Vec<Replay> = recordings.iter().map(|r| replay(nominal, r)).collect::<Result<_>>()?;
+        // Recordings that have a signal as an output.
+        let with = |signal: Signal| {
+            let both = |(index, r): (usize, &Replay)| r.get(signal).and(recordings[index].get(signal)).map(|_| index);
+            replays.iter().enumerate().filter_map(both).collect::<Vec<_>>()
+        };
+        let (mut noise, mut scale) = (BTreeMap::new(), BTreeMap::new());
         for signal in OUTPUTS {
-            let mut measured: Vec<&[f64]> = Vec::new();
-            for recording in recordings {
-                let simulated = replay(nominal, recording)?;
-                measured.extend(simulated.get(signal).and(recording.get(signal)));
-            }
-            let measured: Vec<&[f64]> = measured.into_iter().filter(|v| v.iter().any(|x| !x.is_nan())).collect();
-            if measured.is_empty() {
-                continue;
-            }
-            // No sensor is better than a millionth of what it shows.
-            let finest = 1e-6 * measured.iter().flat_map(|v| v.iter()).fold(1e-6, |a: f64, v| a.max(v.abs()));
+            let measured: Vec<&[f64]> = with(signal).into_iter().filter_map(|k| recordings[k].get(signal)).collect();
+            // A sensor that always shows the same says nothing of the model.
+            let spans = measured.iter().map(|values| span(values)).filter(|span| *span > 0.0);
+            let Some(smallest_span) = spans.reduce(f64::min) else { continue };
+            let finest = 1e-6 * smallest_span; // no sensor is better than a millionth of what it shows
             let level = rms(&measured.iter().map(|values| noise_rms(values)).collect::<Vec<_>>()).max(finest);
-            let structure = STRUCTURE_SHARE * tolerance * span(&measured);
             noise.insert(signal, level);
-            scale.insert(signal, level.hypot(structure));
+            scale.insert(signal, level.hypot(STRUCTURE_SHARE * tolerance * smallest_span));
+        }
+        let counts = |from: &[f64], signal: Signal| {
+            let mut counts = (0, 0);
+            for index in with(signal) {
+                let recording = &recordings[index];
+                let values = recording.get(signal).unwrap_or_default();
+                for (time, _) in recording.time.iter().zip(values).filter(|(_, value)| !value.is_nan()) {
+                    let count = if *time < from[index] { &mut counts.0 } else { &mut counts.1 };
+                    *count += 1;
+                }
+            }
+            counts
+        };
+        let judged = |from: &[f64], signal: &Signal| {
+            let (seen, unseen) = counts(from, *signal);
+            seen >= FEWEST_SAMPLES / 2 && unseen >= FEWEST_SAMPLES / 2
+        };
+        // The last of several recordings is held out, if all signals can be both fitted and judged then.
+        let mut held_out_from = last_recording(recordings);
+        if recordings.len() == 1 || !scale.keys().all(|signal| judged(&held_out_from, signal)) {
+            held_out_from = last_part(recordings);
+            scale.retain(|signal, _| judged(&held_out_from, signal));
         }
         if scale.is_empty() {
             return Err(Error::Recording {
                 path: recordings[0].path.clone(),
-                problem: "no signal was measured that the simulation gives; add `force`, `contraction` or \
-                          `gauge_pressure`"
+                problem: "no output was measured that changes and reaches to the end of the recording; add `force`, \
+                          `contraction` or `gauge_pressure`"
                     .to_owned(),
             });
         }
-        Ok(Self { recordings, held_out_from: split(recordings), noise, scale })
+        Ok(Self { recordings, held_out_from, noise, scale })
+    }
+
+    /// Loss that sensor noise alone leaves.
+    pub fn noise_floor(&self) -> f64 {
+        let shares = self.scale.iter().map(|(signal, scale)| (self.noise[signal] / scale).powi(2));
+        shares.sum::<f64>() / self.scale.len() as f64
     }
 
     /// The signals that can be compared.
@@ -177,17 +203,16 @@ impl<'a> Data<'a> {
     }
 }
 
-/// Where the held-out part of each recording starts: the last of several recordings, else the end of the only one.
-fn split(recordings: &[Recording]) -> Vec<f64> {
-    if let [only] = recordings {
-        let (first, last) = (only.time[0], only.time[only.time.len() - 1]);
-        return vec![first + TRAINING_SHARE * (last - first)];
-    }
-    let mut from = vec![f64::INFINITY; recordings.len()];
-    if let Some(last) = from.last_mut() {
-        *last = f64::NEG_INFINITY;
-    }
-    from
+/// Times from which recordings are held out when it is the last one, whole.
+fn last_recording(recordings: &[Recording]) -> Vec<f64> {
+    let last = recordings.len() - 1;
+    (0..=last).map(|index| if index == last { f64::NEG_INFINITY } else { f64::INFINITY }).collect()
+}
+
+/// Times from which recordings are held out when it is the end of each.
+fn last_part(recordings: &[Recording]) -> Vec<f64> {
+    let from = |time: &Vec<f64>| time[0] + TRAINING_SHARE * (time[time.len() - 1] - time[0]);
+    recordings.iter().map(|recording| from(&recording.time)).collect()
 }
 
 /// Rms noise of a sensor: the scatter about straight lines through neighbouring samples, robust against real motion,
@@ -209,9 +234,10 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-fn span(all: &[&[f64]]) -> f64 {
-    let values = || all.iter().flat_map(|values| values.iter().copied()).filter(|v| !v.is_nan());
-    values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+/// Largest less smallest value; negative where there is none.
+fn span(values: &[f64]) -> f64 {
+    let present = || values.iter().copied().filter(|value| !value.is_nan());
+    present().fold(f64::NEG_INFINITY, f64::max) - present().fold(f64::INFINITY, f64::min)
 }
 
 /// Correlation of neighbours, within what leaves an effective sample size.

@@ -28,8 +28,8 @@ pub struct Chosen {
     pub ranking: Vec<Ranked>,
 }
 
-/// Chooses among fitted candidates.
-pub fn select(baseline: &Fitted, candidates: Vec<Fitted>) -> Chosen {
+/// Chooses among fitted candidates; `floor` is the loss that sensor noise alone would leave.
+pub fn select(baseline: &Fitted, candidates: Vec<Fitted>, floor: f64) -> Chosen {
     let Some(without) = &baseline.held_out else {
         return Chosen { verdict: Verdict::Unexplained, best: None, alternatives: Vec::new(), ranking: Vec::new() };
     };
@@ -55,7 +55,7 @@ pub fn select(baseline: &Fitted, candidates: Vec<Fitted>) -> Chosen {
         return none(Verdict::Nominal, ranking);
     }
     let Some((best, loss, evidence)) = judged.first() else { return none(Verdict::Unexplained, ranking) };
-    let explained = (without.loss - loss) / (without.loss - 1.0);
+    let explained = (without.loss - loss) / (without.loss - floor);
     let beyond_doubt =
         best.held_out.as_ref().is_some_and(|held_out| block_score(without, held_out) > LEAST_BLOCK_SCORE);
     if *evidence < LEAST_EVIDENCE || explained < LEAST_EXPLAINED || !beyond_doubt {
@@ -74,7 +74,8 @@ pub fn select(baseline: &Fitted, candidates: Vec<Fitted>) -> Chosen {
 /// Logarithm of the odds for a candidate: gain of likelihood at the effective number of samples, less what its
 /// parameters cost (Schwarz 1978).
 fn evidence(without: &HeldOut, with: &HeldOut, parameters: usize) -> f64 {
-    let samples = without.effective_samples.max(2.0);
+    // Of the residuals that the candidate leaves: those of the baseline hang together because of what it lacks.
+    let samples = with.effective_samples.max(2.0);
     0.5 * samples * (without.loss / with.loss).ln() - 0.5 * parameters as f64 * samples.ln()
 }
 

@@ -32,6 +32,10 @@ impl Effect for ContractionSensorOffset {
         Readings { contraction: readings.contraction + self.offset, ..readings }
     }
 
+    fn true_contraction(&self, measured: f64) -> f64 {
+        measured - self.offset
+    }
+
     fn sentence(&self) -> String {
         format!("The position sensor shows {:+.2} mm at the rest length.", self.offset * 1e3)
     }

@@ -3,18 +3,6 @@
 //! Every effect is always compiled in and exactly neutral at its default, so that extending a model is freeing
 //! parameters. An effect acts through the hooks of [`Effect`] that concern it and leaves the others as they are.
 
-mod contraction_sensor_offset;
-mod friction_hysteresis;
-mod payload_mass;
-mod valve_lag;
-mod viscous_damping;
-
-pub use contraction_sensor_offset::ContractionSensorOffset;
-pub use friction_hysteresis::FrictionHysteresis;
-pub use payload_mass::PayloadMass;
-pub use valve_lag::ValveLag;
-pub use viscous_damping::ViscousDamping;
-
 use crate::variables::{Declared, Variable};
 
 /// The plant at one instant, as the hooks of an effect see it.
@@ -81,12 +69,21 @@ pub trait Effect: Declared + Default {
     fn readings(&self, readings: Readings) -> Readings {
         readings
     }
+    /// Contraction in m at which the position sensor shows what it does: undoes what this effect does to the reading.
+    fn true_contraction(&self, measured: f64) -> f64 {
+        measured
+    }
     /// One sentence for a person about the size that was found.
     fn sentence(&self) -> String;
 }
 
 macro_rules! effects {
     ($($field:ident: $Effect:ident;)*) => {
+        $(
+            mod $field;
+            pub use $field::$Effect;
+        )*
+
         /// All effects with their parameters.
         #[derive(Debug, Clone, Copy, Default, PartialEq)]
         pub struct Effects {
@@ -144,6 +141,12 @@ macro_rules! effects {
             pub fn readings(&self, mut readings: Readings) -> Readings {
                 $(readings = self.$field.readings(readings);)*
                 readings
+            }
+
+            /// Contraction in m at which the position sensor shows what it does, all effects undone.
+            pub fn true_contraction(&self, mut measured: f64) -> f64 {
+                $(measured = self.$field.true_contraction(measured);)*
+                measured
             }
 
             /// The sentence of the effect with this name.

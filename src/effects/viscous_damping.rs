@@ -11,16 +11,16 @@ crate::variables::variables! {
     /// friction.
     ///
     /// # Validity
-    /// Together with `muscle.damping` the sum must not be negative for the motion to be damped.
+    /// Together with `muscle.damping`, 80 N s/m by default, the sum must not be negative for the motion to be damped.
     ///
     /// # Reference
     /// D. Reynolds et al. (2003), Modeling the dynamic characteristics of pneumatic muscle, doi 10.1114/1.1554921
     /// (damping of inflation and deflation); thesis eq. 3.47.
     pub struct ViscousDamping in "viscous_damping." as Tunable {
         /// Additional damping while the muscle shortens
-        contraction: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-100.0..=1e4);
+        contraction: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-80.0..=1e4);
         /// Additional damping while the muscle lengthens
-        extension: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-100.0..=1e4);
+        extension: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-80.0..=1e4);
     }
 }
 

@@ -1,11 +1,5 @@
 //! The muscle at rest and its static force models, one file per model.
 
-mod improved_mckibben;
-mod virtual_area;
-
-pub use improved_mckibben::ImprovedMcKibben;
-pub use virtual_area::VirtualArea;
-
 use crate::variables::{Choice, Kind, Scalar};
 use std::f64::consts::PI;
 
@@ -64,6 +58,11 @@ pub trait ForceModel {
 
 macro_rules! force_models {
     ($($Variant:ident($Model:ident, $field:ident) = $number:literal, $name:literal, $description:literal;)*) => {
+        $(
+            mod $field;
+            pub use $field::$Model;
+        )*
+
         /// The choice of a static force model.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum ForceModelName {
