@@ -133,6 +133,12 @@ impl Fitted {
         })
     }
 
+    /// Whether it does better than a model on samples that the fit did not see.
+    pub fn beats(&self, model: &Parameters, data: &Data) -> bool {
+        let other = data.held_out_loss(model);
+        self.held_out.as_ref().zip(other).is_some_and(|(own, other)| own.loss < other.loss)
+    }
+
     /// Name of the effect.
     pub fn name(&self) -> &'static str {
         self.effect.map_or("nominal", |effect| effect.name)

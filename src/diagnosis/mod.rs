@@ -133,10 +133,11 @@ pub fn diagnose(
         })
         .collect();
     let chosen = selection::select(&baseline, candidates, data.noise_floor());
-    let extended = chosen.best.as_ref().map_or(baseline.parameters, |best| best.parameters);
-    let nominal_errors = data.held_out_rms(nominal);
-    let extended_errors = data.held_out_rms(&extended);
-    let (nominal_errors, extended_errors) = nominal_errors.zip(extended_errors).ok_or_else(cannot_follow)?;
+    let nominal_errors = data.held_out_rms(nominal).ok_or_else(cannot_follow)?;
+    // Corrections that do not help on unseen samples are not made.
+    let without_cause = if baseline.beats(nominal, &data) { baseline.parameters } else { *nominal };
+    let extended = chosen.best.as_ref().map_or(without_cause, |best| best.parameters);
+    let extended_errors = data.held_out_rms(&extended).ok_or_else(cannot_follow)?;
     let signals: Vec<SignalErrors> = data
         .signals()
         .into_iter()
