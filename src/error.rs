@@ -6,7 +6,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A value outside the range that its declaration allows.
-    #[error("`{variable}` is {value} {unit}, allowed is {min} to {max} {unit}")]
+    #[error("`{variable}` is {value}{unit}, allowed is {min} to {max}{unit}", unit = spaced(unit))]
     OutOfRange {
         /// Full name of the variable.
         variable: String,
@@ -144,6 +144,11 @@ pub enum Error {
         /// What was given.
         argument: String,
     },
+}
+
+/// A unit as it stands behind a number.
+fn spaced(unit: &str) -> String {
+    if unit == "1" { String::new() } else { format!(" {unit}") }
 }
 
 /// `Result` with Sinew's [`enum@Error`].

@@ -2,7 +2,7 @@
 //!
 //! A [`System`] is the equations; a [`Simulator`] integrates them; [`Model`] is the simulator without its type.
 
-use crate::effects::Effects;
+use crate::effects::{Description, Effects};
 use crate::integrator;
 use crate::muscle::ForceModels;
 use crate::parameters::Parameters;
@@ -170,7 +170,12 @@ fn used_by<S: System>(declaration: &Variable) -> bool {
     let group = declaration.group();
     S::GROUPS.contains(&group)
         || (S::GROUPS.contains(&"muscle") && ForceModels::GROUPS.contains(&group))
-        || (S::EFFECTS && Effects::DESCRIPTIONS.iter().any(|effect| effect.name == group))
+        || (S::EFFECTS && Effects::DESCRIPTIONS.iter().any(|effect| effect.name == group && acts_on::<S>(effect)))
+}
+
+/// Whether an effect means anything to a system.
+fn acts_on<S: System>(effect: &Description) -> bool {
+    !effect.of_load || S::GROUPS.contains(&"load")
 }
 
 fn exposed_name<S: System>(declaration: &'static Variable) -> &'static str {

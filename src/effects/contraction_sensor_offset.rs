@@ -25,6 +25,7 @@ impl Effect for ContractionSensorOffset {
         signature: "constant residual of the contraction, also at rest",
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
+        of_load: false,
         free: &[("contraction_sensor_offset.offset", 1e-3)],
     };
 

@@ -41,6 +41,7 @@ impl Effect for FrictionHysteresis {
         signature: "force residual changes sign at reversals, width independent of speed",
         experiment: "triangles of shrinking amplitude at three pressures",
         reference: "Dahl 1968; thesis eq. 4.20",
+        of_load: false,
         free: &[
             ("friction_hysteresis.half_width", 10.0),
             ("friction_hysteresis.half_width_per_pressure", 3e-5),

@@ -40,6 +40,8 @@ pub struct Description {
     pub experiment: &'static str,
     /// Where the equation comes from.
     pub reference: &'static str,
+    /// Whether it concerns the load, and so means nothing to a muscle that is moved from outside.
+    pub of_load: bool,
     /// The parameters that a fit frees: name and where the fit starts, away from neutral.
     pub free: &'static [(&'static str, f64)],
 }

@@ -26,6 +26,7 @@ impl Effect for PayloadMass {
         signature: "force residual in proportion to g + acceleration, also at rest",
         experiment: "two known masses, static and dynamic",
         reference: "thesis eq. 5.4",
+        of_load: true,
         free: &[("payload_mass.additional_mass", 1.0)],
     };
 

@@ -26,6 +26,7 @@ impl Effect for ValveLag {
         signature: "pressure residual in proportion to the rate of pressure, gone when slow",
         experiment: "steps of several sizes with pressure recorded",
         reference: "thesis eq. 5.3",
+        of_load: false,
         free: &[("valve_lag.time_constant", 0.05)],
     };
 

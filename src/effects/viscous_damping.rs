@@ -32,6 +32,7 @@ impl Effect for ViscousDamping {
         signature: "loop of the force residual grows with speed",
         experiment: "the same triangle at three speeds",
         reference: "Reynolds et al. 2003; thesis eq. 3.47",
+        of_load: false,
         free: &[("viscous_damping.contraction", 200.0), ("viscous_damping.extension", 200.0)],
     };
 
