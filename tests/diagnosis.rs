@@ -1,0 +1,128 @@
+//! The diagnosis on recordings made by an independent program (`data/generate.py`), and on spoilt ones.
+
+use sinew::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, Verdict, diagnose};
+use sinew::measurement::Recording;
+use sinew::parameters::Parameters;
+use std::path::Path;
+
+/// A shipped recording, every cell changed by a function of its row, its column's name and its text.
+fn recording(name: &str, change: impl Fn(usize, &str, &str) -> String) -> Recording {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name);
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_path(&path).unwrap();
+    let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(&rows[0]).unwrap();
+    for (k, row) in rows[1..].iter().enumerate() {
+        let columns = rows[0].iter().map(|header| header.split(' ').next().unwrap());
+        writer.write_record(row.iter().zip(columns).map(|(cell, column)| change(k, column, cell))).unwrap();
+    }
+    Recording::parse(&writer.into_inner().unwrap(), &path, &[]).unwrap()
+}
+
+fn as_it_is(name: &str) -> Recording {
+    recording(name, |_, _, cell| cell.to_owned())
+}
+
+fn diagnosis_of(recordings: &[Recording]) -> Diagnosis {
+    diagnose(&Parameters::default(), recordings, DEFAULT_TOLERANCE, &|_| ()).unwrap()
+}
+
+fn causes(found: &Diagnosis) -> Vec<&str> {
+    found.causes.iter().map(|cause| cause.effect).collect()
+}
+
+#[test]
+fn nothing_is_wrong_where_nothing_is() {
+    for name in ["nominal_40kg.csv", "prescribed_motion.csv"] {
+        let found = diagnosis_of(&[as_it_is(name)]);
+        assert_eq!((found.verdict, causes(&found)), (Verdict::Nominal, vec![]), "{name}");
+    }
+}
+
+#[test]
+fn friction_is_found_with_its_size() {
+    // The generator rubs with 12.67 N/bar in five Maxwell elements, the model with one of Dahl's.
+    for names in [&["dry_friction_20kg.csv", "dry_friction_60kg.csv"][..], &["dry_friction_20kg.csv"]] {
+        let recordings: Vec<_> = names.iter().map(|name| as_it_is(name)).collect();
+        let found = diagnosis_of(&recordings);
+        assert_eq!(causes(&found), ["friction_hysteresis"], "{names:?}");
+        let value = |name: &str| found.extended.get(&format!("friction_hysteresis.{name}")).unwrap();
+        let at_two_bar = value("half_width") + 2e5 * value("half_width_per_pressure");
+        assert!((at_two_bar - 25.3).abs() < 2.5, "{at_two_bar} N");
+        assert!(found.improvement > 0.8, "{}", found.improvement);
+    }
+}
+
+#[test]
+fn friction_is_found_from_pressure_and_force_alone() {
+    // Without a command the measured pressure is the input: the chain is cut there.
+    use sinew::measurement::Signal::{Contraction, Force, GaugePressure};
+    let whole = as_it_is("dry_friction_20kg.csv");
+    let [p, x, f] = [GaugePressure, Contraction, Force].map(|signal| whole.bridged(signal).unwrap());
+    let mut text = "time [s],gauge_pressure [Pa],contraction [m],force [N]\n".to_owned();
+    (0..p.len()).for_each(|k| text += &format!("{},{},{},{}\n", whole.time[k], p[k], x[k], f[k]));
+    let cut = Recording::parse(text.as_bytes(), Path::new("cut.csv"), &[]).unwrap();
+    assert_eq!(causes(&diagnosis_of(&[cut])), ["friction_hysteresis"]);
+}
+
+#[test]
+fn a_shifted_position_sensor_is_found_in_hanging_and_prescribed_motion() {
+    for name in ["nominal_40kg.csv", "prescribed_motion.csv"] {
+        let shifted = recording(name, |_, column, cell| match cell.parse::<f64>() {
+            Ok(value) if column == "contraction" => (value + 20.0).to_string(),
+            _ => cell.to_owned(),
+        });
+        let found = diagnosis_of(&[shifted]);
+        assert_eq!(causes(&found), ["contraction_sensor_offset"], "{name}");
+        let offset = found.extended.get("contraction_sensor_offset.offset").unwrap();
+        assert!((offset - 0.02).abs() < 1e-3, "{name}: {offset}");
+    }
+}
+
+#[test]
+fn a_stuck_sensor_does_not_hide_what_the_others_show() {
+    let stuck =
+        recording(
+            "dry_friction_20kg.csv",
+            |_, column, cell| {
+                if column == "force" { "196.2".to_owned() } else { cell.to_owned() }
+            },
+        );
+    let found = diagnosis_of(&[stuck]);
+    assert_eq!(causes(&found), ["friction_hysteresis"]);
+    assert!(found.improvement.is_finite() && found.signals.len() == 2);
+}
+
+#[test]
+fn signals_of_different_recordings_are_all_judged() {
+    let only = |name: &str, keep: &'static str| {
+        recording(name, move |_, column, cell| {
+            let output = ["gauge_pressure", "contraction", "force"].contains(&column);
+            if output && column != keep { String::new() } else { cell.to_owned() }
+        })
+    };
+    let found =
+        diagnosis_of(&[only("dry_friction_20kg.csv", "contraction"), only("dry_friction_60kg.csv", "gauge_pressure")]);
+    assert_ne!(found.verdict, Verdict::Nominal);
+    assert!(found.signals.iter().all(|errors| errors.nominal_rms > 0.0));
+}
+
+#[test]
+fn outputs_that_end_early_are_refused_with_a_sentence() {
+    let silent = recording("dry_friction_20kg.csv", |k, column, cell| {
+        let output = ["gauge_pressure", "contraction", "force"].contains(&column);
+        if output && k > 2000 { String::new() } else { cell.to_owned() }
+    });
+    let refused = diagnose(&Parameters::default(), &[silent], DEFAULT_TOLERANCE, &|_| ()).unwrap_err();
+    assert!(refused.to_string().contains("reaches to the end of the recording"), "{refused}");
+}
+
+#[test]
+fn a_nominal_model_without_damping_is_no_trouble() {
+    let mut nominal = Parameters::default();
+    nominal.muscle.damping = 0.0;
+    let found = diagnose(&nominal, &[as_it_is("dry_friction_20kg.csv")], DEFAULT_TOLERANCE, &|_| ()).unwrap();
+    assert!(found.improvement.is_finite());
+    let damping = found.extended.get("viscous_damping.contraction").unwrap();
+    assert!(damping == 0.0 || (damping - 200.0).abs() > 1e-6, "the start value is no result");
+}

@@ -1,0 +1,376 @@
+"""Recordings with an effect hidden in them, drawn from a seed; the truth goes to a place of its own.
+
+    python generate.py --seed 1 --cases 5 --out hidden      # 5 cases of every effect in hidden/cases, hidden/truths
+"""
+
+import argparse
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import lfilter
+
+from effects import KNOWN, UNKNOWN
+from plant import STEP, VALVE_GAIN, Experiment, Specimen, holding_pressure, simulate
+
+FORMS = {"none": [None], **KNOWN, **UNKNOWN}
+DRIVEN_SHARE = 0.25
+CONTRACTION = (0.045, 0.165)  # m, of commands at rest; overshoot takes some more
+COMMAND_STEP = 0.00025  # V, of the logger
+ALLOWED = (0.015, 0.225)  # m, of everything that happens
+
+# What must be there for an effect to show at all.
+HANGING_ONLY = {
+    "payload_mass", "series_elasticity", "contraction_sensor_gain", "contraction_sensor_delay", "unknown_rubber_stop",
+    "unknown_pendulum", "unknown_guide_spot", "unknown_loose_bracket", "unknown_breathing_frame",
+}  # fmt: skip
+NEEDS_COLUMN = {
+    "pressure_sensor_offset": "gauge_pressure",
+    "pressure_sensor_gain": "gauge_pressure",
+    "force_sensor_offset": "force",
+    "force_sensor_gain": "force",
+    "unknown_mains_hum": "force",
+}
+OF_VALVE = {
+    "valve_lag", "valve_resonance", "valve_dead_time", "valve_dead_band", "valve_gain", "valve_offset",
+    "supply_saturation", "flow_limit", "leakage", "unknown_coarse_converter", "unknown_compressor_cycle",
+    "pressure_sensor_offset", "pressure_sensor_gain",
+}  # fmt: skip
+
+
+@dataclass
+class Plan:
+    """One recording before it is made."""
+
+    experiment: Experiment
+    mass: float | None
+    columns: tuple
+    excitation: str
+    rate: float
+    jitter: float
+
+
+@dataclass
+class Case:
+    """What is hidden, and the recordings that hide it."""
+
+    truth: str
+    severity: float
+    size: dict
+    form: str
+    specimen: Specimen
+    noise: dict
+    plans: list = field(default_factory=list)
+    visibility: float = 0.0
+
+
+# --- Commands ---------------------------------------------------------------------------------------------------------
+
+
+def held_levels(random, duration, shortest, longest, levels):
+    """Piecewise constant on the grid; levels come from an iterator."""
+    count = round(duration / STEP)
+    out, start = np.empty(count), 0
+    while start < count:
+        stop = start + round(random.uniform(shortest, longest) / STEP)
+        out[start:stop] = next(levels)
+        start = stop
+    return out
+
+
+def staircase(random, duration):
+    steps = random.integers(4, 8)
+    climb = np.concatenate([np.linspace(0, 1, steps), np.linspace(1, 0, steps)[1:-1]])
+    climb = np.roll(climb, random.integers(len(climb)))
+    return held_levels(random, duration, 1.5, 3.5, iter(np.tile(climb, 100)))
+
+
+def random_steps(random, duration):
+    """Steps of at most a third of the range: larger ones would throw the load out of it."""
+
+    def levels():
+        level = random.uniform(0.2, 0.8)
+        while True:
+            yield level
+            level = np.clip(level + either(random) * random.uniform(0.05, 0.33), 0, 1)
+
+    return held_levels(random, duration, 0.6, 3.0, levels())
+
+
+def ramps(random, duration):
+    """Triangles and trapezes at rates from slow to fast, of several amplitudes."""
+    times, levels = [0.0], [random.uniform(0.2, 0.8)]
+    while times[-1] < duration:
+        target = random.uniform(0, 1)
+        rate = np.exp(random.uniform(np.log(0.08), np.log(1.0)))
+        times += [times[-1] + abs(target - levels[-1]) / rate + 0.05]
+        levels += [target]
+        if random.random() < 0.5:
+            times += [times[-1] + random.uniform(0.3, 2)]
+            levels += [target]
+    return np.interp(STEP * np.arange(round(duration / STEP)), times, levels)
+
+
+def multisine(random, duration):
+    t = STEP * np.arange(round(duration / STEP))
+    frequencies = np.exp(random.uniform(np.log(0.05), np.log(0.8), random.integers(4, 9)))
+    waves = [np.sin(2 * np.pi * f * t + random.uniform(0, 2 * np.pi)) / np.sqrt(1 + 4 * f) for f in frequencies]
+    total = np.sum(waves, axis=0)
+    return (total - total.min()) / np.ptp(total)
+
+
+EXCITATIONS = {"staircase": staircase, "ramps": ramps, "multisine": multisine, "random_steps": random_steps}
+
+
+def either(random):
+    return random.choice([-1, 1])
+
+
+def course(random, excitation, duration):
+    """A share of the range over time: a second of rest, then the excitation, its corners rounded over 0.1 s."""
+    share = EXCITATIONS[excitation](random, duration)
+    share = np.concatenate([np.full(round(1 / STEP), share[0]), share])
+    return uniform_filter1d(share, round(0.1 / STEP), mode="nearest")
+
+
+def hanging_command(random, excitation, duration, mass, reach):
+    middle, half = np.mean(CONTRACTION), reach * np.ptp(CONTRACTION) / 2
+    wanted = middle + half * (2 * course(random, excitation, duration) - 1)
+    return holding_pressure(wanted, mass) / VALVE_GAIN
+
+
+def imposed_motion(random, duration):
+    """A testing machine: strokes at several rates, starting gently."""
+    share = course(random, random.choice(["ramps", "multisine"]), duration)
+    return uniform_filter1d(0.03 + 0.15 * share, round(0.3 / STEP), mode="nearest")
+
+
+# --- Cases ------------------------------------------------------------------------------------------------------------
+
+
+def draw_specimen(random):
+    """Within 2 % of the preset, its area up to 0.15 % off a straight line."""
+    factor = lambda: random.uniform(0.98, 1.02)  # noqa: E731
+    return Specimen(factor(), factor(), factor(), random.uniform(0, 0.0015), random.uniform(0, 2 * np.pi))
+
+
+def draw_noise(random):
+    """Standard deviation (coloured and white together), memory in s, resolution, per column in SI."""
+    typical = {"gauge_pressure": 250.0, "contraction": 5e-5, "force": 0.8}
+    drawn = {}
+    for column, level in typical.items():
+        level *= np.exp(random.uniform(-0.8, 0.8))
+        drawn[column] = {
+            "level": level,
+            "white_share": random.uniform(0.3, 0.9),
+            "memory": random.uniform(0.01, 0.06),
+            "resolution": level * random.uniform(0.2, 1.5),
+        }
+    return drawn
+
+
+def draw_columns(random, truth, driven):
+    """Which sensors were logged; never without the one that the effect is about."""
+    if driven:
+        choices = [("gauge_pressure", "force", "command")] * 3 + [("force", "command")]
+        if truth not in OF_VALVE:
+            choices.append(("gauge_pressure", "force"))
+        choices = [("contraction", *columns) for columns in choices]
+    else:
+        choices = [("gauge_pressure", "force")] * 3 + [("gauge_pressure",), ("force",), ()]
+        choices = [("command", "contraction", *columns) for columns in choices]
+    needed = NEEDS_COLUMN.get(truth)
+    choices = [columns for columns in choices if needed is None or needed in columns]
+    return choices[random.integers(len(choices))]
+
+
+def draw_mass(random, truth):
+    heaviest = 25 if truth == "threshold_pressure" else 80  # a threshold shows at low pressure only
+    return float(np.round(np.exp(random.uniform(np.log(10), np.log(heaviest))), 1))
+
+
+def draw_case(random, truth, severity):
+    forms = FORMS[truth]
+    form = forms[random.integers(len(forms))]
+    driven = truth not in HANGING_ONLY and random.random() < DRIVEN_SHARE
+    columns = draw_columns(random, truth, driven)
+    masses = [None if driven else draw_mass(random, truth) for _ in range(random.integers(1, 4))]
+    size = form.sizes(random, severity) if form else {}
+    if truth == "payload_mass":
+        size["lightest"] = min(masses)
+    case = Case(truth, severity, size, getattr(form, "__name__", "none"), draw_specimen(random), draw_noise(random))
+    rate, jitter = random.choice([50, 80, 100, 125, 200]), random.choice([0.0, random.uniform(0.02, 0.2)])
+    relaxed = bool(random.random() < 0.5)
+    for mass in masses:
+        excitation = random.choice(list(EXCITATIONS))
+        duration = random.uniform(22, 38)
+        experiment = draw_experiment(random, case, form, mass, excitation, duration, relaxed)
+        case.plans.append(Plan(experiment, mass, columns, str(excitation), float(rate), float(jitter)))
+    return case
+
+
+def draw_experiment(random, case, form, mass, excitation, duration, relaxed):
+    common = {"specimen": case.specimen, "form": form, "size": case.size, "relaxed": relaxed}
+    if mass is None:
+        low, high = random.uniform(0.8, 1.5), random.uniform(2.5, 4.5)
+        command = low + (high - low) * course(random, excitation, duration)
+        return Experiment(command=command, motion=imposed_motion(random, duration), **common)
+    command = hanging_command(random, excitation, duration, mass, random.uniform(0.6, 1.0))
+    return Experiment(command=command, mass=mass, **common)
+
+
+# --- Sensors and files ------------------------------------------------------------------------------------------------
+
+
+def sample_times(random, plan, length):
+    period = 1 / plan.rate
+    times = np.arange(0, length - period, period)
+    times[1:] += period * plan.jitter * random.uniform(-1, 1, len(times) - 1)
+    return np.round(times, 5)
+
+
+def reading(random, signal, rate, noise):
+    """Noise with a memory and without, finite resolution, a few samples lost."""
+    kept = np.exp(-1 / (rate * noise["memory"]))
+    shocks = random.standard_normal(len(signal) + 200) * np.sqrt(1 - kept**2)
+    coloured = lfilter([1], [1, -kept], shocks)[200:]
+    white = noise["white_share"]
+    disturbed = signal + noise["level"] * (
+        np.sqrt(1 - white**2) * coloured + white * random.standard_normal(len(signal))
+    )
+    shown = noise["resolution"] * np.round(disturbed / noise["resolution"])
+    shown[random.choice(np.arange(1, len(shown)), random.integers(0, 9), replace=False)] = np.nan
+    return shown
+
+
+UNITS = {
+    "time": ("s", 1.0, 5), "command": ("V", 1.0, 5), "gauge_pressure": ("bar", 1e-5, 6), "contraction": ("mm", 1e3, 5),
+    "force": ("N", 1.0, 3), "load_mass": ("kg", 1.0, 1),
+}  # fmt: skip
+
+
+def write_recording(path, columns):
+    headers = [f"{name} [{UNITS[name][0]}]" for name in columns]
+    scaled = [UNITS[name][1] * values for name, values in columns.items()]
+    decimals = [UNITS[name][2] for name in columns]
+    with open(path, "w") as file:
+        file.write(",".join(headers) + "\n")
+        for row in zip(*scaled, strict=True):
+            cells = ["" if np.isnan(v) else f"{v:.{d}f}" for v, d in zip(row, decimals, strict=True)]
+            file.write(",".join(cells) + "\n")
+
+
+def true_signals(course_run, times):
+    quantities = {"gauge_pressure": "pressure", "contraction": "contraction", "force": "force"}
+    return {name: CubicSpline(course_run.time, getattr(course_run, q))(times) for name, q in quantities.items()}
+
+
+def recorded(random, case, plan, run):
+    """Columns as the logger has them."""
+    times = sample_times(random, plan, run.time[-1])
+    signals = true_signals(run, times)
+    grid = STEP * np.arange(len(plan.experiment.command))
+    columns = {"time": times}
+    for name in plan.columns:
+        if name == "command":
+            columns[name] = COMMAND_STEP * np.round(np.interp(times, grid, plan.experiment.command) / COMMAND_STEP)
+        else:
+            columns[name] = reading(random, signals[name], plan.rate, case.noise[name])
+    if plan.mass is not None:
+        columns["load_mass"] = np.full(len(times), plan.mass)
+    return columns
+
+
+def visibility(case, plan, run, twin):
+    """How much the effect changes the readings, in noise levels, in the signal where it shows most."""
+    at = run.time[::10]
+    with_effect, without = true_signals(run, at), true_signals(twin, at)
+    outputs = [name for name in plan.columns if name in case.noise and not (plan.mass is None and name == "contraction")]
+    changes = [np.sqrt(np.mean((with_effect[n] - without[n]) ** 2)) / case.noise[n]["level"] for n in outputs]
+    return float(max(changes))
+
+
+def is_feasible(run):
+    return ALLOWED[0] < run.contraction.min() and run.contraction.max() < ALLOWED[1]
+
+
+def without_effect(experiment):
+    return Experiment(experiment.specimen, experiment.command, experiment.mass, experiment.motion)
+
+
+def make(truths, severity, seed):
+    """Cases with the runs of their recordings; what leaves the feasible range is drawn anew."""
+    random = np.random.default_rng(seed)
+    made = [None] * len(truths)
+    for _ in range(20):
+        open_cases = [k for k, case in enumerate(made) if case is None]
+        if not open_cases:
+            return made
+        drawn = [draw_case(random, truths[k], severity) for k in open_cases]
+        experiments = [plan.experiment for case in drawn for plan in case.plans]
+        both = simulate(experiments + [without_effect(experiment) for experiment in experiments])
+        runs, twins = iter(both[: len(experiments)]), iter(both[len(experiments) :])
+        for k, case in zip(open_cases, drawn, strict=True):
+            pairs = [(next(runs), next(twins)) for _ in case.plans]
+            if all(is_feasible(run) and is_feasible(twin) for run, twin in pairs):
+                case.visibility = max(
+                    visibility(case, plan, *pair) for plan, pair in zip(case.plans, pairs, strict=True)
+                )
+                made[k] = (case, [run for run, _ in pairs])
+    raise RuntimeError("some effects never stay within the feasible range")
+
+
+def plain(value):
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def write_case(random, name, case, runs, out):
+    folder = out / "cases" / name
+    folder.mkdir(parents=True)
+    for number, (plan, run) in enumerate(zip(case.plans, runs, strict=True), start=1):
+        write_recording(folder / f"run{number}.csv", recorded(random, case, plan, run))
+    truth = {
+        "effect": case.truth,
+        "form": case.form,
+        "severity": case.severity,
+        "size": {key: plain(value) for key, value in case.size.items()},
+        "visibility": case.visibility,
+        "specimen": vars(case.specimen),
+        "relaxed": case.plans[0].experiment.relaxed,
+        "recordings": [
+            {"load_mass": p.mass, "excitation": p.excitation, "columns": p.columns, "rate": p.rate, "jitter": p.jitter}
+            for p in case.plans
+        ],
+        "noise": case.noise,
+    }
+    (out / "truths").mkdir(exist_ok=True)
+    (out / "truths" / f"{name}.json").write_text(json.dumps(truth, indent=1, default=plain))
+
+
+def write_cases(truths, severity, seed, out):
+    """Writes cases for a list of truths; gives their names."""
+    random = np.random.default_rng([seed, 1])  # of the sensors, apart from that of the plants
+    names = []
+    for k, (case, runs) in enumerate(make(truths, severity, seed)):
+        names.append(f"case_{k:04d}")
+        write_case(random, names[-1], case, runs, out)
+    return names
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--cases", type=int, default=1, help="of each effect")
+    parser.add_argument("--effects", default=",".join(FORMS), help="separated by commas")
+    parser.add_argument("--severity", type=float, default=1.0, help="size of the effects: 1 full, 0.333 one third")
+    parser.add_argument("--out", type=Path, required=True)
+    options = parser.parse_args()
+    truths = [effect for effect in options.effects.split(",") for _ in range(options.cases)]
+    write_cases(truths, options.severity, options.seed, options.out)
+
+
+if __name__ == "__main__":
+    main()
