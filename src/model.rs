@@ -6,7 +6,7 @@ use crate::effects::{Description, Effects};
 use crate::integrator;
 use crate::muscle::ForceModels;
 use crate::parameters::Parameters;
-use crate::variables::{Declared, Role, Signals, Variable};
+use crate::variables::{Declared, Signals, Variable};
 use crate::{Error, Result};
 
 /// Output of a model and the inputs that it depends on without delay.
@@ -146,7 +146,8 @@ impl Interface {
     pub fn of<S: System>() -> Self {
         let inputs = S::Inputs::VARIABLES;
         let outputs = S::Outputs::VARIABLES;
-        let as_is = |declaration| ModelVariable { name: Variable::name(declaration), declaration, default: 0.0 };
+        let as_is =
+            |declaration: &'static Variable| ModelVariable { name: declaration.name, declaration, default: 0.0 };
         let mut variables: Vec<_> = inputs.iter().chain(outputs).map(as_is).collect();
         Parameters::default().visit(&mut |declaration, default| {
             if used_by::<S>(declaration) {
@@ -285,8 +286,6 @@ pub trait Model: Send {
     fn interface(&self) -> &'static Interface;
     /// Time in s.
     fn time(&self) -> f64;
-    /// All parameters.
-    fn parameters(&self) -> &Parameters;
     /// Starts anew with these parameters, as if just made.
     fn reset(&mut self, parameters: &Parameters);
     /// Sets the clock, for a host that keeps its own; the state stays as it is.
@@ -344,10 +343,6 @@ impl<S: Registered> Model for Simulator<S> {
 
     fn time(&self) -> f64 {
         self.time
-    }
-
-    fn parameters(&self) -> &Parameters {
-        &self.parameters
     }
 
     fn reset(&mut self, parameters: &Parameters) {
@@ -459,22 +454,5 @@ impl<S: Registered> Model for Simulator<S> {
         }
         *self = restored;
         Ok(())
-    }
-}
-
-impl Variable {
-    /// Full name, as a function that can be passed on.
-    fn name(variable: &'static Variable) -> &'static str {
-        variable.name
-    }
-
-    /// First part of the name: the group it belongs to.
-    pub fn group(&self) -> &'static str {
-        self.name.split('.').next().unwrap_or(self.name)
-    }
-
-    /// Whether a parameter may change while simulating.
-    pub fn is_tunable(&self) -> bool {
-        self.role == Role::Tunable && matches!(self.kind, crate::variables::Kind::Real)
     }
 }

@@ -109,6 +109,16 @@ pub struct Variable {
 }
 
 impl Variable {
+    /// First part of the name: the group it belongs to.
+    pub fn group(&self) -> &'static str {
+        self.name.split('.').next().unwrap_or(self.name)
+    }
+
+    /// Whether a parameter may change while simulating.
+    pub fn is_tunable(&self) -> bool {
+        self.role == Role::Tunable && matches!(self.kind, Kind::Real)
+    }
+
     /// Checks a value against this declaration.
     ///
     /// # Errors

@@ -486,7 +486,7 @@ mod tests {
         let logger = Box::new(move |status, _: &str, text: &str| listener.borrow_mut().push((status, text.to_owned())));
         let mut model = models().remove(0);
         let guid = GUIDS[0].as_str();
-        let parameters = *model.parameters();
+        let parameters = Parameters::default();
         model.reset(&parameters);
         let mut instance = Instance::new(Start { guid, model, parameters }, Log::new(logger, false));
         let status = instance.call("fmi2Test", &Phase::SAVED, |_| panic!("at the disco"));
