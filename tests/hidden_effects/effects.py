@@ -18,10 +18,12 @@ def either_sign(random, low, high):
 
 
 class Form:
+    """Its parameters become attributes, each an array with one entry per column."""
+
     def __init__(self, at, size):
         self.at = at
-        self.size = size
-        self.__dict__.update(size)
+        for name, values in size.items():
+            setattr(self, name, values)
 
 
 # --- Dry friction -----------------------------------------------------------------------------------------------------
@@ -132,7 +134,8 @@ class Creep(Form):
 class TwoStepCreep(Creep):
     @staticmethod
     def sizes(random, severity):
-        return {"amount": severity * random.uniform(0.05, 0.18), "fast": random.uniform(0.7, 3), "slow": random.uniform(6, 30)}
+        times = {"fast": random.uniform(0.7, 3), "slow": random.uniform(6, 30)}
+        return {"amount": severity * random.uniform(0.05, 0.18), **times}
 
     def times(self):
         return np.stack([self.fast, self.slow])
@@ -496,7 +499,8 @@ class GuideSpot(Form):
 
     @staticmethod
     def sizes(random, severity):
-        return {"grip": severity * random.uniform(60, 150), "where": random.uniform(0.08, 0.14), "width": random.uniform(0.006, 0.012)}
+        place = {"where": random.uniform(0.08, 0.14), "width": random.uniform(0.006, 0.012)}
+        return {"grip": severity * random.uniform(60, 150), **place}
 
     def act(self, now):
         x, v = now.x[self.at], now.v[self.at]

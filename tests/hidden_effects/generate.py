@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
+from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from effects import KNOWN, UNKNOWN
@@ -18,6 +19,8 @@ from plant import STEP, VALVE_GAIN, Experiment, Specimen, holding_pressure, simu
 
 FORMS = {"none": [None], **KNOWN, **UNKNOWN}
 DRIVEN_SHARE = 0.25
+TOLERANCE = 0.03  # of the preset's coefficients, that of the tool by default
+MOST_DRAWS = 20
 CONTRACTION = (0.045, 0.165)  # m, of commands at rest; overshoot takes some more
 COMMAND_STEP = 0.00025  # V, of the logger
 ALLOWED = (0.015, 0.225)  # m, of everything that happens
@@ -95,7 +98,7 @@ def random_steps(random, duration):
         level = random.uniform(0.2, 0.8)
         while True:
             yield level
-            level = np.clip(level + either(random) * random.uniform(0.05, 0.33), 0, 1)
+            level = np.clip(level + random.choice([-1, 1]) * random.uniform(0.05, 0.33), 0, 1)
 
     return held_levels(random, duration, 0.6, 3.0, levels())
 
@@ -125,10 +128,6 @@ def multisine(random, duration):
 EXCITATIONS = {"staircase": staircase, "ramps": ramps, "multisine": multisine, "random_steps": random_steps}
 
 
-def either(random):
-    return random.choice([-1, 1])
-
-
 def course(random, excitation, duration):
     """A share of the range over time: a second of rest, then the excitation, its corners rounded over 0.1 s."""
     share = EXCITATIONS[excitation](random, duration)
@@ -153,8 +152,8 @@ def imposed_motion(random, duration):
 
 def draw_specimen(random):
     """Within 2 % of the preset, its area up to 0.15 % off a straight line."""
-    factor = lambda: random.uniform(0.98, 1.02)  # noqa: E731
-    return Specimen(factor(), factor(), factor(), random.uniform(0, 0.0015), random.uniform(0, 2 * np.pi))
+    factors = random.uniform(0.98, 1.02, 3)
+    return Specimen(*factors, ripple=random.uniform(0, 0.0015), ripple_phase=random.uniform(0, 2 * np.pi))
 
 
 def draw_noise(random):
@@ -238,10 +237,8 @@ def reading(random, signal, rate, noise):
     shocks = random.standard_normal(len(signal) + 200) * np.sqrt(1 - kept**2)
     coloured = lfilter([1], [1, -kept], shocks)[200:]
     white = noise["white_share"]
-    disturbed = signal + noise["level"] * (
-        np.sqrt(1 - white**2) * coloured + white * random.standard_normal(len(signal))
-    )
-    shown = noise["resolution"] * np.round(disturbed / noise["resolution"])
+    disturbance = np.sqrt(1 - white**2) * coloured + white * random.standard_normal(len(signal))
+    shown = noise["resolution"] * np.round((signal + noise["level"] * disturbance) / noise["resolution"])
     shown[random.choice(np.arange(1, len(shown)), random.integers(0, 9), replace=False)] = np.nan
     return shown
 
@@ -284,42 +281,64 @@ def recorded(random, case, plan, run):
     return columns
 
 
-def visibility(case, plan, run, twin):
-    """How much the effect changes the readings, in noise levels, in the signal where it shows most."""
-    at = run.time[::10]
-    with_effect, without = true_signals(run, at), true_signals(twin, at)
-    outputs = [name for name in plan.columns if name in case.noise and not (plan.mass is None and name == "contraction")]
-    changes = [np.sqrt(np.mean((with_effect[n] - without[n]) ** 2)) / case.noise[n]["level"] for n in outputs]
-    return float(max(changes))
+def reference(plan, run, **factors):
+    """The preset muscle in place of the true one; an imposed motion is taken as the sensor shows it."""
+    motion = plan.experiment.motion
+    if motion is not None:
+        motion = np.interp(STEP * np.arange(len(motion)), run.time, run.contraction)
+    return Experiment(Specimen(**factors), plan.experiment.command, plan.mass, motion)
+
+
+def add_visibility(cases):
+    """How much of an effect shows beyond what the tolerance allows, in noise levels, in the signal where it shows most.
+
+    The best preset muscle within the tolerance is found by linear least squares on signals without noise.
+    """
+    pairs = [(plan, run) for case, runs in cases for plan, run in zip(case.plans, runs, strict=True)]
+    small = 0.01
+    changes = [{}, {"area": 1 + small}, {"elastic": 1 + small}, {"damping": 1 + small}]
+    references = iter(simulate([reference(*pair, **change) for pair in pairs for change in changes]))
+    for case, runs in cases:
+        rows = {}
+        for plan, run in zip(case.plans, runs, strict=True):
+            own = [next(references) for _ in changes]
+            at = run.time[::10]
+            truth, nominal, *changed = (true_signals(course_run, at) for course_run in (run, *own))
+            inputs = {"command"} if plan.mass else {"command", "contraction"}
+            for name in set(plan.columns) - inputs:
+                slopes = [(other[name] - nominal[name]) / small for other in changed]
+                block = np.stack([truth[name] - nominal[name], *slopes], axis=1) / case.noise[name]["level"]
+                rows.setdefault(name, []).append(block)
+        rows = {name: np.concatenate(blocks) for name, blocks in rows.items()}
+        case.visibility = remaining(rows)
+
+
+def remaining(rows):
+    """Largest rms per signal of the first column after the best bounded combination of the others is taken off."""
+    together = np.concatenate(list(rows.values()))
+    best = lsq_linear(together[:, 1:], together[:, 0], bounds=(-TOLERANCE, TOLERANCE)).x
+    return float(max(np.sqrt(np.mean((block[:, 0] - block[:, 1:] @ best) ** 2)) for block in rows.values()))
 
 
 def is_feasible(run):
     return ALLOWED[0] < run.contraction.min() and run.contraction.max() < ALLOWED[1]
 
 
-def without_effect(experiment):
-    return Experiment(experiment.specimen, experiment.command, experiment.mass, experiment.motion)
-
-
 def make(truths, severity, seed):
-    """Cases with the runs of their recordings; what leaves the feasible range is drawn anew."""
+    """Cases with the courses of their recordings; what leaves the feasible range is drawn anew."""
     random = np.random.default_rng(seed)
     made = [None] * len(truths)
-    for _ in range(20):
+    for _ in range(MOST_DRAWS):
         open_cases = [k for k, case in enumerate(made) if case is None]
         if not open_cases:
+            add_visibility(made)
             return made
         drawn = [draw_case(random, truths[k], severity) for k in open_cases]
-        experiments = [plan.experiment for case in drawn for plan in case.plans]
-        both = simulate(experiments + [without_effect(experiment) for experiment in experiments])
-        runs, twins = iter(both[: len(experiments)]), iter(both[len(experiments) :])
+        runs = iter(simulate([plan.experiment for case in drawn for plan in case.plans]))
         for k, case in zip(open_cases, drawn, strict=True):
-            pairs = [(next(runs), next(twins)) for _ in case.plans]
-            if all(is_feasible(run) and is_feasible(twin) for run, twin in pairs):
-                case.visibility = max(
-                    visibility(case, plan, *pair) for plan, pair in zip(case.plans, pairs, strict=True)
-                )
-                made[k] = (case, [run for run, _ in pairs])
+            own = [next(runs) for _ in case.plans]
+            if all(map(is_feasible, own)):
+                made[k] = (case, own)
     raise RuntimeError("some effects never stay within the feasible range")
 
 

@@ -142,7 +142,8 @@ class Batch:
         now.p = now.target.copy()
         # The least contraction whose holding pressure reaches the present one, from a table.
         table = np.linspace(0, 0.25, 501)
-        now.x = np.array([np.interp(p, holding_pressure(table, m), table) for p, m in zip(now.p, now.mass, strict=True)])
+        pairs = zip(now.p, now.mass, strict=True)
+        now.x = np.array([np.interp(p, holding_pressure(table, mass), table) for p, mass in pairs])
         if len(now.driven):
             now.x[now.driven] = self.motion[0]
 
