@@ -367,13 +367,7 @@ impl<S: Registered> Model for Simulator<S> {
             return self.outputs().get(position - interface.inputs);
         }
         let name = interface.variables[position].declaration.name;
-        let mut found = 0.0;
-        self.parameters.visit(&mut |variable, value| {
-            if variable.name == name {
-                found = value;
-            }
-        });
-        found
+        self.parameters.find(name).map_or(0.0, |(_, value)| value)
     }
 
     fn set(&mut self, position: usize, value: f64) {

@@ -2,7 +2,7 @@
 
 use crate::model::{Interface, ModelVariable};
 use crate::parameters::Parameters;
-use crate::variables::{Declared, Kind, Role, Unit, Variable};
+use crate::variables::{Kind, Role, Unit, Variable};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use std::io;
@@ -188,7 +188,7 @@ fn write_variables(xml: &mut Xml, interface: &Interface, parameters: &Parameters
 
 fn write_type(xml: &mut Xml, variable: &ModelVariable, parameters: &Parameters) -> io::Result<()> {
     let declaration = variable.declaration;
-    let start = start_value(variable, parameters);
+    let start = parameters.find(declaration.name).map_or(variable.default, |(_, value)| value);
     let (element_name, type_name) = match declaration.kind {
         Kind::Real => ("Real", declaration.unit.quantity),
         Kind::Enumeration(name, _) => ("Enumeration", name),
@@ -210,16 +210,6 @@ fn write_type(xml: &mut Xml, variable: &ModelVariable, parameters: &Parameters) 
         attributes.push(("start", number(start)));
     }
     element(xml, element_name, attributes)
-}
-
-fn start_value(variable: &ModelVariable, parameters: &Parameters) -> f64 {
-    let mut start = variable.default;
-    parameters.visit(&mut |declaration, value| {
-        if declaration.name == variable.declaration.name {
-            start = value;
-        }
-    });
-    start
 }
 
 /// A number as XML Schema reads it back exactly.

@@ -4,7 +4,7 @@ use crate::effects::Effects;
 use crate::model::Interface;
 use crate::model_description::model_description;
 use crate::parameters::Parameters;
-use crate::variables::{Declared, Kind};
+use crate::variables::Kind;
 use crate::{Error, Result};
 use minijinja::context;
 use std::io::{Cursor, Write};
@@ -106,13 +106,7 @@ fn documentation(interface: &Interface, parameters: &Parameters) -> String {
         .iter()
         .map(|variable| {
             let declaration = variable.declaration;
-            let mut start = None;
-            parameters.visit(&mut |other, value| {
-                if other.name == declaration.name {
-                    start = Some(value);
-                }
-            });
-            let start = start.map(|value| match declaration.kind {
+            let start = parameters.find(declaration.name).map(|(_, value)| match declaration.kind {
                 Kind::Real => short(value),
                 Kind::Enumeration(_, choices) => choices[value as usize - 1].name.to_owned(),
             });

@@ -174,13 +174,18 @@ impl Parameters {
     /// # Errors
     /// [`Error::UnknownParameter`].
     pub fn get(&self, name: &str) -> Result<f64> {
+        self.find(name).map(|(_, value)| value).ok_or_else(|| Error::UnknownParameter { name: name.to_owned() })
+    }
+
+    /// Declaration and value of a parameter by its full name; `None` where there is none.
+    pub fn find(&self, name: &str) -> Option<(&'static Variable, f64)> {
         let mut found = None;
         self.visit(&mut |variable, value| {
             if variable.name == name {
-                found = Some(value);
+                found = Some((variable, value));
             }
         });
-        found.ok_or_else(|| Error::UnknownParameter { name: name.to_owned() })
+        found
     }
 
     /// Sets a parameter by its full name.
@@ -200,12 +205,7 @@ impl Parameters {
     }
 
     fn set_text(&mut self, name: &str, text: &str) -> Result<()> {
-        let mut choices = None;
-        self.visit(&mut |variable, _| {
-            if variable.name == name {
-                choices = Some(variable.kind);
-            }
-        });
+        let choices = self.find(name).map(|(variable, _)| variable.kind);
         let wrong = |expected| Error::WrongKind { name: name.to_owned(), expected, found: text.to_owned() };
         match choices {
             None => Err(Error::UnknownParameter { name: name.to_owned() }),

@@ -66,13 +66,7 @@ impl Candidate {
 }
 
 fn declared(parameters: &Parameters, name: &str) -> (&'static Variable, f64) {
-    let mut found = None;
-    parameters.visit(&mut |variable, value| {
-        if variable.name == name {
-            found = Some((variable, value));
-        }
-    });
-    found.unwrap_or_else(|| panic!("`{name}` is declared"))
+    parameters.find(name).unwrap_or_else(|| panic!("`{name}` is declared"))
 }
 
 /// A candidate after its fit.

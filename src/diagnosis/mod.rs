@@ -12,7 +12,6 @@ mod residuals;
 mod selection;
 
 pub use candidates::FittedParameter;
-pub use residuals::noise_rms;
 
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
