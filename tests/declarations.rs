@@ -49,14 +49,13 @@ fn names_are_unique_and_defaults_are_allowed() {
         variable.check(value).unwrap();
     });
     for effect in Effects::DESCRIPTIONS {
-        assert!(!effect.free.is_empty());
-        for (name, start) in effect.free {
-            assert!(name.starts_with(effect.name) && names.contains(name));
-            let neutral = Parameters::default().get(name).unwrap();
-            Parameters::default().set(name, *start).unwrap();
-            let away = *start != neutral || effect.free.len() > 1;
-            assert!(away, "the fit of {name} starts at neutral");
+        for (name, starts) in effect.forms.iter().copied().flatten().chain(effect.refinements) {
+            assert!(name.starts_with(effect.name) && names.contains(name), "{name}");
+            starts.iter().for_each(|start| Parameters::default().set(name, *start).unwrap());
         }
+        let mut switched_on = Parameters::default();
+        effect.typical().for_each(|(name, start)| switched_on.set(name, start).unwrap());
+        assert_ne!(switched_on, Parameters::default(), "the fit of {} starts at neutral", effect.name);
     }
 }
 
@@ -64,7 +63,7 @@ fn names_are_unique_and_defaults_are_allowed() {
 fn running(model: &mut dyn Model, seed: u32) {
     let mut parameters = Parameters::default();
     for effect in Effects::DESCRIPTIONS {
-        effect.free.iter().for_each(|(name, start)| parameters.set(name, *start).unwrap());
+        effect.typical().for_each(|(name, start)| parameters.set(name, start).unwrap());
     }
     parameters.initial.gauge_pressure = 2e5;
     model.reset(&parameters);
@@ -127,7 +126,7 @@ fn every_effect_acts_on_the_plant() {
             let mut parameters = Parameters::default();
             parameters.initial.gauge_pressure = 1e5;
             if on {
-                effect.free.iter().for_each(|(name, start)| parameters.set(name, *start).unwrap());
+                effect.typical().for_each(|(name, start)| parameters.set(name, start).unwrap());
             }
             let mut model = models().into_iter().next().unwrap();
             model.reset(&parameters);

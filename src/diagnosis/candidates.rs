@@ -56,9 +56,9 @@ impl Candidate {
                 free.push((variable, Free { start: value, lower: value - size, upper: value + size, typical: size }));
             }
         }
-        for (name, start) in self.effect.map_or(&[][..], |effect| effect.free) {
+        for (name, start) in self.effect.into_iter().flat_map(Description::typical) {
             let (variable, _) = declared(nominal, name);
-            let bounds = Free { start: *start, lower: variable.min, upper: variable.max, typical: start.abs() };
+            let bounds = Free { start, lower: variable.min, upper: variable.max, typical: start.abs() };
             free.push((variable, bounds));
         }
         free

@@ -26,7 +26,8 @@ impl Effect for ContractionSensorOffset {
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
         of_load: false,
-        free: &[("contraction_sensor_offset.offset", 1e-3)],
+        forms: &[&[("contraction_sensor_offset.offset", &[1e-3])]],
+        refinements: &[],
     };
 
     fn readings(&self, readings: Readings) -> Readings {

@@ -42,11 +42,12 @@ impl Effect for FrictionHysteresis {
         experiment: "triangles of shrinking amplitude at three pressures",
         reference: "Dahl 1968; thesis eq. 4.20",
         of_load: false,
-        free: &[
-            ("friction_hysteresis.half_width", 10.0),
-            ("friction_hysteresis.half_width_per_pressure", 3e-5),
-            ("friction_hysteresis.presliding_displacement", 2e-3),
-        ],
+        forms: &[&[
+            ("friction_hysteresis.half_width", &[10.0]),
+            ("friction_hysteresis.half_width_per_pressure", &[3e-5]),
+            ("friction_hysteresis.presliding_displacement", &[2e-3]),
+        ]],
+        refinements: &[],
     };
     const STATES: usize = 1;
 

@@ -42,8 +42,21 @@ pub struct Description {
     pub reference: &'static str,
     /// Whether it concerns the load, and so means nothing to a muscle that is moved from outside.
     pub of_load: bool,
-    /// The parameters that a fit frees: name and where the fit starts, away from neutral.
-    pub free: &'static [(&'static str, f64)],
+    /// Common forms of the effect, each the parameters that a fit frees; the best form stands for the cause.
+    pub forms: &'static [&'static [Freed]],
+    /// Parameters that are freed as well once the effect leads, and stay free only where the data pay for them.
+    pub refinements: &'static [Freed],
+}
+
+/// A parameter that a fit frees, and values away from neutral where fits start: start k of a form takes the k-th value of
+/// each parameter, or its last.
+pub type Freed = (&'static str, &'static [f64]);
+
+impl Description {
+    /// Where the first fit of the first form starts: the effect at work, at a usual size.
+    pub fn typical(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.forms[0].iter().map(|(name, starts)| (*name, starts[0]))
+    }
 }
 
 /// A physical effect: its parameters, its states, and the places where it acts.

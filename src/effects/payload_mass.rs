@@ -27,7 +27,8 @@ impl Effect for PayloadMass {
         experiment: "two known masses, static and dynamic",
         reference: "thesis eq. 5.4",
         of_load: true,
-        free: &[("payload_mass.additional_mass", 1.0)],
+        forms: &[&[("payload_mass.additional_mass", &[1.0])]],
+        refinements: &[],
     };
 
     fn mass(&self, mass: f64) -> f64 {

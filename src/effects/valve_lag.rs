@@ -27,7 +27,8 @@ impl Effect for ValveLag {
         experiment: "steps of several sizes with pressure recorded",
         reference: "thesis eq. 5.3",
         of_load: false,
-        free: &[("valve_lag.time_constant", 0.05)],
+        forms: &[&[("valve_lag.time_constant", &[0.05])]],
+        refinements: &[],
     };
 
     fn valve_bandwidth(&self, bandwidth: f64) -> f64 {

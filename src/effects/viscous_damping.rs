@@ -33,7 +33,8 @@ impl Effect for ViscousDamping {
         experiment: "the same triangle at three speeds",
         reference: "Reynolds et al. 2003; thesis eq. 3.47",
         of_load: false,
-        free: &[("viscous_damping.contraction", 200.0), ("viscous_damping.extension", 200.0)],
+        forms: &[&[("viscous_damping.contraction", &[200.0]), ("viscous_damping.extension", &[200.0])]],
+        refinements: &[],
     };
 
     fn muscle_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
