@@ -2,7 +2,8 @@
 //!
 //! # Model
 //! Levenberg–Marquardt on Σ r², with steps projected onto the bounds and parameters at a bound that push outwards left
-//! out of the step. Derivatives are forward differences, taken in parallel.
+//! out of the step. Derivatives are forward differences, taken in parallel; those of parameters that act linearly are
+//! known beforehand and cost nothing. A prior counts as one more residual.
 //!
 //! # Reference
 //! D. Marquardt (1963), doi 10.1137/0111030; projection as in C. Kanzow, N. Yamashita, M. Fukushima (2004),
@@ -22,6 +23,19 @@ pub struct Free {
     pub upper: f64,
     /// A change of this size matters.
     pub typical: f64,
+    /// Mean and standard deviation of what is known beforehand.
+    pub prior: Option<(f64, f64)>,
+}
+
+/// A parameter whose effect on the residuals is known and linear.
+#[derive(Debug, Clone)]
+pub struct Linear {
+    /// The parameter.
+    pub free: Free,
+    /// Change of every residual per unit of the parameter.
+    pub column: Vec<f64>,
+    /// Value of the parameter that the residuals are computed with.
+    pub origin: f64,
 }
 
 /// How a fit ended.
@@ -38,91 +52,169 @@ pub enum Ended {
 /// What a fit found.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// Values of the parameters.
+    /// Values of the parameters, those that act linearly last.
     pub parameters: Vec<f64>,
-    /// Σ r² there.
+    /// Residuals there, priors not among them; shape `(n_residuals,)`.
+    pub residuals: Vec<f64>,
+    /// Σ r² there, with the priors.
     pub cost: f64,
-    /// Covariance for residuals of unit variance; infinite variance where the data say nothing.
-    pub variances: Vec<f64>,
     /// How it ended.
     pub ended: Ended,
 }
 
-const MOST_ITERATIONS: usize = 40;
 /// Relative decrease of the cost below which a fit has converged.
 const SMALL_DECREASE: f64 = 1e-6;
+/// Damping above which no smaller step is worth a try.
+const LARGEST_DAMPING: f64 = 1e6;
 
-/// Minimises the sum of squares of `residuals`, which gives `None` where it cannot be computed.
-pub fn fit(residuals: &(impl Fn(&[f64]) -> Option<Vec<f64>> + Sync), free: &[Free]) -> Fit {
-    let mut parameters: Vec<f64> = free.iter().map(|f| f.start.clamp(f.lower, f.upper)).collect();
-    let residuals = &|parameters: &[f64]| residuals(parameters).filter(|all| all.iter().all(|r| r.is_finite()));
-    let Some(mut current) = residuals(&parameters) else {
-        return Fit {
-            parameters,
-            cost: f64::INFINITY,
-            variances: vec![f64::INFINITY; free.len()],
-            ended: Ended::NoStart,
-        };
+/// What is minimised.
+struct Problem<'a, R> {
+    residuals: &'a R,
+    free: Vec<Free>,
+    linear: &'a [Linear],
+}
+
+/// A place with its residuals.
+struct Place {
+    parameters: Vec<f64>,
+    residuals: Vec<f64>,
+    cost: f64,
+}
+
+/// Minimises the sum of squares of `residuals`, which gives `None` where it cannot be computed; it sees the parameters
+/// `free`, and those that are `linear` are added.
+pub fn fit<R>(residuals: &R, free: &[Free], linear: &[Linear], most_iterations: usize) -> Fit
+where
+    R: Fn(&[f64]) -> Option<Vec<f64>> + Sync,
+{
+    let all: Vec<Free> = free.iter().copied().chain(linear.iter().map(|l| l.free)).collect();
+    let problem = Problem { residuals, free: all, linear };
+    let start: Vec<f64> = problem.free.iter().map(|f| f.start.clamp(f.lower, f.upper)).collect();
+    let Some(mut current) = problem.place(&start) else {
+        return Fit { parameters: start, residuals: Vec::new(), cost: f64::INFINITY, ended: Ended::NoStart };
     };
     let mut damping = 1e-3;
     let mut ended = Ended::IterationLimit;
-    let mut normal = DMatrix::zeros(free.len(), free.len());
-    for _ in 0..MOST_ITERATIONS {
-        let cost = sum_of_squares(&current);
-        let gradient;
-        (normal, gradient) = normal_equations(residuals, free, &parameters, &current);
-        let accepted = loop {
-            let trial = step(&normal, &gradient, free, &parameters, damping);
-            let better = residuals(&trial).filter(|trial| sum_of_squares(trial) < cost);
-            if let Some(better) = better {
-                damping = (damping * 0.2).max(1e-12);
-                break Some((trial, better));
-            }
-            damping *= 5.0;
-            if damping > 1e8 {
-                break None;
-            }
-        };
-        let Some((trial, better)) = accepted else {
+    for _ in 0..most_iterations {
+        let columns = problem.columns(&current);
+        let (normal, gradient) = problem.normal_equations(&columns, &current);
+        let Some(better) = problem.better(&normal, &gradient, &current, &mut damping) else {
             ended = Ended::Converged;
             break;
         };
-        let decrease = cost - sum_of_squares(&better);
-        (parameters, current) = (trial, better);
-        if decrease <= SMALL_DECREASE * cost {
+        let decrease = current.cost - better.cost;
+        current = better;
+        if decrease <= SMALL_DECREASE * current.cost {
             ended = Ended::Converged;
             break;
         }
     }
-    Fit { variances: variances(&normal, free), cost: sum_of_squares(&current), parameters, ended }
+    Fit { parameters: current.parameters, residuals: current.residuals, cost: current.cost, ended }
 }
 
-fn sum_of_squares(values: &[f64]) -> f64 {
-    values.iter().map(|value| value * value).sum()
-}
-
-/// JᵀJ and Jᵀr, with parameters in their typical sizes.
-fn normal_equations(
-    residuals: &(impl Fn(&[f64]) -> Option<Vec<f64>> + Sync),
-    free: &[Free],
-    parameters: &[f64],
-    current: &[f64],
-) -> (DMatrix<f64>, DVector<f64>) {
-    let columns: Vec<Vec<f64>> = (0..free.len())
+/// Derivatives of the residuals by the free parameters at a place, one column each; differences like those of [`fit`].
+pub fn derivatives<R>(residuals: &R, free: &[Free], at: &[f64], here: &[f64]) -> Vec<Vec<f64>>
+where
+    R: Fn(&[f64]) -> Option<Vec<f64>> + Sync,
+{
+    (0..free.len())
         .into_par_iter()
         .map(|k| {
             // Away from the nearer bound, so that the shifted point is allowed.
-            let inwards = if parameters[k] - free[k].lower > free[k].upper - parameters[k] { -1.0 } else { 1.0 };
-            let difference = inwards * 1e-4;
-            let mut shifted = parameters.to_vec();
-            shifted[k] += difference * free[k].typical;
-            let shifted = residuals(&shifted).unwrap_or_else(|| current.to_vec());
-            shifted.iter().zip(current).map(|(after, before)| (after - before) / difference).collect()
+            let inwards = if at[k] - free[k].lower > free[k].upper - at[k] { -1.0 } else { 1.0 };
+            let difference = inwards * 1e-3 * free[k].typical;
+            let mut shifted = at.to_vec();
+            shifted[k] += difference;
+            let shifted = residuals(&shifted).filter(|r| all_finite(r)).unwrap_or_else(|| here.to_vec());
+            shifted.iter().zip(here).map(|(after, before)| (after - before) / difference).collect()
         })
-        .collect();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let normal = DMatrix::from_fn(free.len(), free.len(), |i, j| dot(&columns[i], &columns[j]));
-    (normal, DVector::from_fn(free.len(), |i, _| dot(&columns[i], current)))
+        .collect()
+}
+
+fn all_finite(values: &[f64]) -> bool {
+    values.iter().all(|value| value.is_finite())
+}
+
+impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
+    fn nonlinear(&self) -> usize {
+        self.free.len() - self.linear.len()
+    }
+
+    fn place(&self, parameters: &[f64]) -> Option<Place> {
+        let mut residuals = (self.residuals)(&parameters[..self.nonlinear()]).filter(|r| all_finite(r))?;
+        for (linear, value) in self.linear.iter().zip(&parameters[self.nonlinear()..]) {
+            let change = value - linear.origin;
+            residuals.iter_mut().zip(&linear.column).for_each(|(r, slope)| *r += change * slope);
+        }
+        let known = self.free.iter().zip(parameters).filter_map(|(free, value)| {
+            let (mean, deviation) = free.prior?;
+            Some(((value - mean) / deviation).powi(2))
+        });
+        let cost = residuals.iter().map(|r| r * r).sum::<f64>() + known.sum::<f64>();
+        Some(Place { parameters: parameters.to_vec(), residuals, cost })
+    }
+
+    /// ∂r/∂parameter times the typical change, one column per parameter.
+    fn columns(&self, at: &Place) -> Vec<Vec<f64>> {
+        let nonlinear = self.nonlinear();
+        let without_linear = |parameters: &[f64]| {
+            let mut all = at.parameters.clone();
+            all[..nonlinear].copy_from_slice(parameters);
+            self.place(&all).map(|place| place.residuals)
+        };
+        let mut columns =
+            derivatives(&without_linear, &self.free[..nonlinear], &at.parameters[..nonlinear], &at.residuals);
+        columns.extend(self.linear.iter().map(|linear| linear.column.clone()));
+        for (column, free) in columns.iter_mut().zip(&self.free) {
+            column.iter_mut().for_each(|value| *value *= free.typical);
+        }
+        columns
+    }
+
+    /// JᵀJ and Jᵀr, with parameters in their typical sizes.
+    fn normal_equations(&self, columns: &[Vec<f64>], at: &Place) -> (DMatrix<f64>, DVector<f64>) {
+        let count = self.free.len();
+        let mut normal = normal_matrix(columns);
+        let mut gradient = DVector::from_fn(count, |i, _| dot(&columns[i], &at.residuals));
+        for (k, free) in self.free.iter().enumerate() {
+            if let Some((mean, deviation)) = free.prior {
+                let weight = free.typical / deviation;
+                normal[(k, k)] += weight * weight;
+                gradient[k] += weight * (at.parameters[k] - mean) / deviation;
+            }
+        }
+        (normal, gradient)
+    }
+
+    /// The next place whose cost is smaller, if there is one.
+    fn better(&self, normal: &DMatrix<f64>, gradient: &DVector<f64>, from: &Place, damping: &mut f64) -> Option<Place> {
+        while *damping <= LARGEST_DAMPING {
+            let trial = step(normal, gradient, &self.free, &from.parameters, *damping);
+            if let Some(better) = self.place(&trial).filter(|trial| trial.cost < from.cost) {
+                *damping = (*damping * 0.1).max(1e-12);
+                return Some(better);
+            }
+            *damping *= 10.0;
+        }
+        None
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Products of all pairs of columns.
+pub fn normal_matrix(columns: &[Vec<f64>]) -> DMatrix<f64> {
+    let mut normal = DMatrix::zeros(columns.len(), columns.len());
+    for i in 0..columns.len() {
+        for j in 0..=i {
+            let product = dot(&columns[i], &columns[j]);
+            normal[(i, j)] = product;
+            normal[(j, i)] = product;
+        }
+    }
+    normal
 }
 
 fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, free: &[Free], parameters: &[f64], damping: f64) -> Vec<f64> {
@@ -146,25 +238,20 @@ fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, free: &[Free], parameter
     trial
 }
 
-fn variances(normal: &DMatrix<f64>, free: &[Free]) -> Vec<f64> {
-    match normal.clone().try_inverse() {
-        Some(inverse) => (0..free.len()).map(|k| inverse[(k, k)].abs() * free[k].typical.powi(2)).collect(),
-        None => vec![f64::INFINITY; free.len()],
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const MOST: usize = 60;
+
     fn free(start: f64, lower: f64, upper: f64) -> Free {
-        Free { start, lower, upper, typical: 1.0 }
+        Free { start, lower, upper, typical: 1.0, prior: None }
     }
 
     #[test]
     fn rosenbrock_is_solved() {
         let rosenbrock = |p: &[f64]| Some(vec![1.0 - p[0], 10.0 * (p[1] - p[0] * p[0])]);
-        let found = fit(&rosenbrock, &[free(-1.2, -5.0, 5.0), free(1.0, -5.0, 5.0)]);
+        let found = fit(&rosenbrock, &[free(-1.2, -5.0, 5.0), free(1.0, -5.0, 5.0)], &[], MOST);
         assert_eq!(found.ended, Ended::Converged);
         assert!((found.parameters[0] - 1.0).abs() < 1e-3 && (found.parameters[1] - 1.0).abs() < 2e-3, "{found:?}");
     }
@@ -173,23 +260,26 @@ mod tests {
     fn bounds_hold_and_the_rest_is_still_optimal() {
         // Minimum of (x - 3)² + (x + y)² with x <= 1 is x = 1, y = -1.
         let residuals = |p: &[f64]| Some(vec![p[0] - 3.0, p[0] + p[1]]);
-        let found = fit(&residuals, &[free(0.0, -1.0, 1.0), free(0.0, -5.0, 5.0)]);
+        let found = fit(&residuals, &[free(0.0, -1.0, 1.0), free(0.0, -5.0, 5.0)], &[], MOST);
         assert_eq!(found.parameters[0], 1.0);
         assert!((found.parameters[1] + 1.0).abs() < 1e-6, "{found:?}");
     }
 
     #[test]
-    fn a_parameter_without_influence_stays_and_is_unknown() {
-        let found = fit(&|p: &[f64]| Some(vec![p[0] - 2.0]), &[free(0.0, -5.0, 5.0), free(0.3, -5.0, 5.0)]);
+    fn a_parameter_without_influence_stays() {
+        let found = fit(&|p: &[f64]| Some(vec![p[0] - 2.0]), &[free(0.0, -5.0, 5.0), free(0.3, -5.0, 5.0)], &[], MOST);
         assert!((found.parameters[0] - 2.0).abs() < 1e-6);
         assert!((found.parameters[1] - 0.3).abs() < 1e-9);
-        assert_eq!(found.variances[1], f64::INFINITY);
     }
 
     #[test]
-    fn variance_of_a_mean() {
-        let data = [1.0, 2.0, 4.0, 5.0];
-        let found = fit(&|p: &[f64]| Some(data.iter().map(|d| d - p[0]).collect()), &[free(0.0, -9.0, 9.0)]);
-        assert!((found.parameters[0] - 3.0).abs() < 1e-6 && (found.variances[0] - 0.25).abs() < 1e-6);
+    fn a_linear_parameter_and_a_prior_are_solved_together() {
+        // (x - 1)² + (x + y - 5)² + (y - 1)² with y linear: the minimum is x = 2, y = 2.
+        let residuals = |p: &[f64]| Some(vec![p[0] - 1.0, p[0] - 5.0]);
+        let known = Free { prior: Some((1.0, 1.0)), ..free(0.0, -9.0, 9.0) };
+        let linear = Linear { free: known, column: vec![0.0, 1.0], origin: 0.0 };
+        let found = fit(&residuals, &[free(0.0, -9.0, 9.0)], &[linear], MOST);
+        assert!((found.parameters[0] - 2.0).abs() < 1e-6 && (found.parameters[1] - 2.0).abs() < 1e-6, "{found:?}");
+        assert!((found.cost - 3.0).abs() < 1e-9 && found.residuals.len() == 2);
     }
 }

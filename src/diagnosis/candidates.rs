@@ -1,14 +1,20 @@
-//! Candidates: the nominal model with its small corrections and the parameters of one effect set free.
+//! Hypotheses: the nominal model with its small corrections and the parameters of some effects set free; and their fits.
 
-use super::Cause;
-use super::residuals::{Data, HeldOut};
-use crate::effects::{Description, Effects};
-use crate::least_squares::{self, Ended, Free};
+use super::residuals::{Data, Loss, Scope};
+use crate::effects::{Description, Freed};
+use crate::least_squares::{self, Ended, Free, Linear, derivatives, normal_matrix};
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
+use nalgebra::DMatrix;
 
-/// Corrections that every fit may make, as factors on a nominal value.
-const CORRECTIONS: [&str; 3] = ["muscle.area_scale", "muscle.elastic_scale", "muscle.damping"];
+/// Corrections that every fit may make, as shares of the nominal value: a muscle and its valve are never quite the preset.
+const COEFFICIENTS: [&str; 4] = ["muscle.area_scale", "muscle.elastic_scale", "muscle.damping", "valve.bandwidth"];
+/// Corrections of shape: a polynomial is never quite the muscle.
+const SHAPES: [&str; 3] = ["muscle.area_tilt", "muscle.area_bend", "muscle.elastic_tilt"];
+/// Expected size of a correction of shape, as a share of the declared tolerance.
+const SHAPE_SHARE: f64 = 0.2;
+/// Iterations of a fit that need not be exact, and of one that counts.
+const ITERATIONS: (usize, usize) = (12, 25);
 
 /// A parameter as fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,43 +31,57 @@ pub struct FittedParameter {
     pub unit: &'static str,
 }
 
-/// What a fit sets free: the corrections, and one effect or none.
-pub struct Candidate {
-    effect: Option<&'static Description>,
+/// An effect at work in one of its forms.
+#[derive(Debug, Clone, Copy)]
+pub struct Part {
+    /// The effect.
+    pub effect: &'static Description,
+    /// Which of its forms.
+    pub form: usize,
+    /// Whether its refinements are free as well.
+    pub refined: bool,
 }
 
-impl Candidate {
-    /// The nominal model, corrected within its tolerance.
-    pub fn corrections_only() -> Self {
-        Self { effect: None }
+impl Part {
+    fn freed(self) -> impl Iterator<Item = &'static Freed> {
+        let refinements: &'static [Freed] = if self.refined { self.effect.refinements } else { &[] };
+        self.effect.forms[self.form].iter().chain(refinements)
+    }
+}
+
+/// The nominal model with its corrections and some effects at work.
+#[derive(Debug, Clone, Default)]
+pub struct Hypothesis {
+    /// The effects.
+    pub parts: Vec<Part>,
+}
+
+impl Hypothesis {
+    /// With one effect more.
+    pub fn with(&self, part: Part) -> Self {
+        Self { parts: self.parts.iter().copied().chain([part]).collect() }
     }
 
-    /// One candidate per effect.
-    pub fn all() -> Vec<Self> {
-        Effects::DESCRIPTIONS.iter().map(|effect| Self { effect: Some(effect) }).collect()
+    /// Names of the effects, sorted.
+    pub fn names(&self) -> Vec<&'static str> {
+        let mut names: Vec<_> = self.parts.iter().map(|part| part.effect.name).collect();
+        names.sort_unstable();
+        names
     }
 
-    /// Name of the effect.
-    pub fn name(&self) -> &'static str {
-        self.effect.map_or("nominal", |effect| effect.name)
+    /// Whether an effect is at work.
+    pub fn has(&self, effect: &str) -> bool {
+        self.parts.iter().any(|part| part.effect.name == effect)
     }
 
-    /// The free parameters with their bounds: corrections first.
-    fn free(&self, nominal: &Parameters, tolerance: f64) -> Vec<(&'static Variable, Free)> {
-        let mut free = Vec::new();
-        for name in CORRECTIONS {
-            let (variable, value) = declared(nominal, name);
-            let size = tolerance * value.abs();
-            if size > 0.0 {
-                free.push((variable, Free { start: value, lower: value - size, upper: value + size, typical: size }));
-            }
-        }
-        for (name, start) in self.effect.into_iter().flat_map(Description::typical) {
-            let (variable, _) = declared(nominal, name);
-            let bounds = Free { start, lower: variable.min, upper: variable.max, typical: start.abs() };
-            free.push((variable, bounds));
-        }
-        free
+    fn variables(&self) -> Vec<&'static Variable> {
+        let freed = self.parts.iter().flat_map(|part| part.freed());
+        freed.map(|(name, _)| declared(&Parameters::default(), name).0).collect()
+    }
+
+    /// How many parameters the effects have.
+    pub fn size(&self) -> usize {
+        self.parts.iter().map(|part| part.freed().count()).sum()
     }
 }
 
@@ -69,85 +89,248 @@ fn declared(parameters: &Parameters, name: &str) -> (&'static Variable, f64) {
     parameters.find(name).unwrap_or_else(|| panic!("`{name}` is declared"))
 }
 
-/// A candidate after its fit.
-#[derive(Debug, Clone)]
-pub struct Fitted {
-    effect: Option<&'static Description>,
-    /// The whole model.
-    pub parameters: Parameters,
-    /// The corrections that were made.
-    pub corrections: Vec<FittedParameter>,
-    found: Vec<FittedParameter>,
-    /// How it does on samples that the fit did not see.
-    pub held_out: Option<HeldOut>,
+/// Parameters with some of them set.
+fn with_values(base: &Parameters, variables: &[&'static Variable], values: &[f64]) -> Parameters {
+    let mut parameters = *base;
+    parameters.visit_mut(&mut |variable, old| {
+        variables.iter().position(|free| free.name == variable.name).map_or(old, |k| values[k])
+    });
+    parameters
 }
 
-impl Fitted {
-    /// Fits a candidate to the samples that fits may see; `None` where it cannot be simulated.
-    pub fn fit(candidate: &Candidate, nominal: &Parameters, data: &Data, tolerance: f64) -> Option<Self> {
-        let free = candidate.free(nominal, tolerance);
-        let corrections = free.iter().filter(|(variable, _)| CORRECTIONS.contains(&variable.name)).count();
-        let bounds: Vec<Free> = free.iter().map(|(_, free)| *free).collect();
-        let with = |values: &[f64]| {
-            let mut parameters = *nominal;
-            parameters.visit_mut(&mut |variable, old| {
-                free.iter().position(|(free, _)| free.name == variable.name).map_or(old, |k| values[k])
-            });
-            parameters
-        };
+/// A hypothesis after its fit.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// What was free.
+    pub hypothesis: Hypothesis,
+    /// The whole model.
+    pub parameters: Parameters,
+    /// Measured − simulated in SI, as [`Data::residuals`] gives them; with corrections to first order in a quick fit.
+    pub residuals: Vec<f64>,
+    /// How large they are, on all samples.
+    pub losses: Vec<Loss>,
+}
+
+/// What fits of all hypotheses have in common.
+pub struct Bench<'a> {
+    /// The recordings.
+    pub data: Data<'a>,
+    nominal: &'a Parameters,
+    /// Corrections with their bounds and priors.
+    corrections: Vec<(&'static Variable, Free)>,
+    /// Change of the residuals per unit of each correction; empty before the baseline is known.
+    slopes: Vec<Vec<f64>>,
+    weights: Vec<f64>,
+}
+
+impl<'a> Bench<'a> {
+    /// Prepares fits of a nominal model that is good to `tolerance`.
+    pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64) -> Self {
+        let relative = COEFFICIENTS.iter().filter_map(|name| {
+            let (variable, start) = declared(nominal, name);
+            let size = tolerance * start.abs();
+            // The deviation of a uniform distribution over the tolerance.
+            let prior = Some((start, size / 3.0_f64.sqrt()));
+            let bounds = Free { start, lower: start - size, upper: start + size, typical: size, prior };
+            (size > 0.0).then_some((variable, bounds))
+        });
+        let shapes = SHAPES.iter().map(|name| {
+            let (variable, start) = declared(nominal, name);
+            let size = SHAPE_SHARE * tolerance;
+            let (lower, upper) = (start - 3.0 * size, start + 3.0 * size);
+            (variable, Free { start, lower, upper, typical: size, prior: Some((start, size)) })
+        });
+        let corrections = relative.chain(shapes).collect();
+        let weights = data.weights(Scope::All);
+        Self { data, nominal, corrections, slopes: Vec::new(), weights }
+    }
+
+    /// Takes what a better model shows of the noise.
+    pub fn refine_noise(&mut self, residuals: &[f64]) {
+        self.data.refine_noise(residuals);
+        self.weights = self.data.weights(Scope::All);
+    }
+
+    /// Fits the corrections alone, and learns what each of them does to the residuals.
+    ///
+    /// `None` where the nominal model cannot be simulated.
+    pub fn baseline(&mut self) -> Option<Fitted> {
+        let baseline = self.fit(&Hypothesis::default(), self.nominal, Scope::All)?;
+        let (variables, free): (Vec<_>, Vec<_>) = self.corrections.iter().copied().unzip();
+        let at: Vec<f64> = variables.iter().map(|v| declared(&baseline.parameters, v.name).1).collect();
+        let residuals = |values: &[f64]| self.data.residuals(&with_values(self.nominal, &variables, values));
+        self.slopes = derivatives(&residuals, &free, &at, &baseline.residuals);
+        Some(baseline)
+    }
+
+    /// Fits a hypothesis on the samples in scope, starting from a model.
+    ///
+    /// `None` where the start cannot be simulated.
+    pub fn fit(&self, hypothesis: &Hypothesis, start: &Parameters, scope: Scope) -> Option<Fitted> {
+        let (variables, free) = self.everything_free(hypothesis, start);
+        let weights = self.data.weights(scope);
         let residuals = |values: &[f64]| {
-            let mut residuals = data.training_residuals(&with(values))?;
-            // A correction of the whole tolerance counts as one expected residual: it is allowed, not encouraged.
-            residuals.extend(bounds.iter().zip(values).take(corrections).map(|(b, v)| (v - b.start) / b.typical));
-            Some(residuals)
+            Some(weighted(&self.data.residuals(&with_values(self.nominal, &variables, values))?, &weights))
         };
-        let fit = least_squares::fit(&residuals, &bounds);
+        let fit = least_squares::fit(&residuals, &free, &[], ITERATIONS.1);
         if fit.ended == Ended::NoStart {
             return None;
         }
-        let parameters = with(&fit.parameters);
-        let samples = residuals(&fit.parameters).map_or(1, |r| r.len());
-        // Residuals are neither of unit variance nor independent: both widen the interval.
-        let widen = fit.cost / samples as f64 * data.samples_per_independent(&parameters);
-        let fitted: Vec<FittedParameter> = (0..free.len())
-            .map(|k| {
-                let (value, half) = (fit.parameters[k], 1.96 * (fit.variances[k] * widen).sqrt());
-                let (low, high) = (value - half, value + half);
-                let (name, unit) = (free[k].0.name, free[k].0.unit.symbol);
-                FittedParameter { name, value, low: low.max(bounds[k].lower), high: high.min(bounds[k].upper), unit }
+        let parameters = with_values(self.nominal, &variables, &fit.parameters);
+        Some(self.fitted(hypothesis, parameters, self.data.residuals(&parameters)?))
+    }
+
+    /// Fits a hypothesis on all samples, with the corrections to first order: one simulation per parameter of the effects.
+    ///
+    /// `None` where the start cannot be simulated.
+    pub fn quick_fit(&self, hypothesis: &Hypothesis, start: &Parameters) -> Option<Fitted> {
+        let variables = hypothesis.variables();
+        let free = bounds(&variables, start);
+        let linear: Vec<Linear> = self
+            .corrections
+            .iter()
+            .zip(&self.slopes)
+            .map(|((variable, free), slope)| {
+                let origin = declared(start, variable.name).1;
+                let free = Free { start: origin, ..*free };
+                Linear { free, column: weighted(slope, &self.weights), origin }
             })
             .collect();
-        let (corrections, found) = fitted.split_at(corrections);
-        Some(Self {
-            effect: candidate.effect,
-            parameters,
-            corrections: corrections.to_vec(),
-            found: found.to_vec(),
-            held_out: data.held_out_loss(&parameters),
-        })
+        let residuals = |values: &[f64]| {
+            Some(weighted(&self.data.residuals(&with_values(start, &variables, values))?, &self.weights))
+        };
+        let fit = least_squares::fit(&residuals, &free, &linear, ITERATIONS.0);
+        if fit.ended == Ended::NoStart {
+            return None;
+        }
+        let all: Vec<_> =
+            variables.iter().chain(self.corrections.iter().map(|(variable, _)| variable)).copied().collect();
+        let parameters = with_values(start, &all, &fit.parameters);
+        let raw = fit.residuals.iter().zip(&self.weights).map(|(r, weight)| r / weight).collect();
+        Some(self.fitted(hypothesis, parameters, raw))
     }
 
-    /// Whether it does better than a model on samples that the fit did not see.
-    pub fn beats(&self, model: &Parameters, data: &Data) -> bool {
-        let other = data.held_out_loss(model);
-        self.held_out.as_ref().zip(other).is_some_and(|(own, other)| own.loss < other.loss)
+    fn fitted(&self, hypothesis: &Hypothesis, parameters: Parameters, residuals: Vec<f64>) -> Fitted {
+        let losses = self.data.losses(&residuals, Scope::All);
+        Fitted { hypothesis: hypothesis.clone(), parameters, residuals, losses }
     }
 
-    /// Name of the effect.
-    pub fn name(&self) -> &'static str {
-        self.effect.map_or("nominal", |effect| effect.name)
+    /// Where fits of a hypothesis with one effect more start: every start of every form, the most promising first.
+    ///
+    /// How promising is judged from one simulation: how much of the weighted squares of the residuals goes away when the
+    /// change that the effect makes is scaled and the corrections and the parameters so far adapt, to first order.
+    pub fn starts(&self, base: &Fitted, effect: &'static Description) -> Vec<(f64, Part, Parameters)> {
+        let residuals = weighted(&base.residuals, &self.weights);
+        let mut starts = Vec::new();
+        for form in 0..effect.forms.len() {
+            let part = Part { effect, form, refined: false };
+            let most = part.freed().map(|(_, starts)| starts.len()).max().unwrap_or(0);
+            for k in 0..most {
+                let mut start = base.parameters;
+                for (name, values) in part.freed() {
+                    let value = values.get(k).or(values.last()).copied().unwrap_or_default();
+                    start = with_values(&start, &[declared(&start, name).0], &[value]);
+                }
+                if let Some(changed) = self.data.residuals(&start) {
+                    let change: Vec<f64> = weighted(&changed, &self.weights)
+                        .iter()
+                        .zip(&residuals)
+                        .map(|(after, before)| after - before)
+                        .collect();
+                    starts.push((self.promise(&residuals, change), part, start));
+                }
+            }
+        }
+        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        starts
     }
 
-    /// How many parameters the effect has.
-    pub fn size(&self) -> usize {
-        self.found.len()
+    /// Share of the squares that goes away when a change is scaled, up to five times, and the corrections adapt.
+    fn promise(&self, residuals: &[f64], change: Vec<f64>) -> f64 {
+        let free = Free { start: 1.0, lower: 0.0, upper: 5.0, typical: 1.0, prior: None };
+        let mut linear = vec![Linear { free: Free { start: 0.0, ..free }, column: change, origin: 0.0 }];
+        linear.extend(self.corrections.iter().zip(&self.slopes).map(|((_, free), slope)| {
+            let size = free.typical;
+            let free = Free { start: 0.0, lower: -2.0 * size, upper: 2.0 * size, prior: None, ..*free };
+            Linear { free, column: weighted(slope, &self.weights), origin: 0.0 }
+        }));
+        let fit = least_squares::fit(&|_: &[f64]| Some(residuals.to_vec()), &[], &linear, 6);
+        1.0 - fit.cost / residuals.iter().map(|r| r * r).sum::<f64>()
     }
 
-    /// The cause as it is told.
-    pub fn cause(&self, alternatives: Vec<&'static str>) -> Option<Cause> {
-        let effect = self.effect?;
-        let sentence = self.parameters.effects.sentence(effect.name)?;
-        let (parameters, experiment) = (self.found.clone(), effect.experiment);
-        Some(Cause { effect: effect.name, sentence, parameters, alternatives, experiment })
+    fn everything_free(&self, hypothesis: &Hypothesis, start: &Parameters) -> (Vec<&'static Variable>, Vec<Free>) {
+        let mut variables = hypothesis.variables();
+        let mut free = bounds(&variables, start);
+        for (variable, correction) in &self.corrections {
+            variables.push(variable);
+            free.push(Free { start: declared(start, variable.name).1, ..*correction });
+        }
+        (variables, free)
     }
+
+    /// The parameters of a fit with their 95 % intervals: those of the effects, then the corrections.
+    ///
+    /// The scatter of the estimate comes from how large the residuals of each signal are and how long they hang together,
+    /// noise or not (sandwich, H. White 1982, doi 10.2307/1912526).
+    pub fn intervals(&self, fitted: &Fitted, scope: Scope) -> (Vec<FittedParameter>, Vec<FittedParameter>) {
+        let (variables, free) = self.everything_free(&fitted.hypothesis, &fitted.parameters);
+        let at: Vec<f64> = free.iter().map(|f| f.start).collect();
+        let residuals = |values: &[f64]| self.data.residuals(&with_values(self.nominal, &variables, values));
+        let columns = derivatives(&residuals, &free, &at, &fitted.residuals);
+        let (bread, filling) = self.normal_matrices(&columns, &free, fitted, scope);
+        let deviations = bread.try_inverse().map(|inverse| &inverse * filling * &inverse);
+        let parameters = variables.iter().enumerate().map(|(k, variable)| {
+            let deviation = deviations.as_ref().map_or(f64::INFINITY, |c| c[(k, k)].max(0.0).sqrt() * free[k].typical);
+            let (value, half) = (at[k], 1.96 * deviation);
+            let (low, high) = ((value - half).max(free[k].lower), (value + half).min(free[k].upper));
+            FittedParameter { name: variable.name, value, low, high, unit: variable.unit.symbol }
+        });
+        let mut found: Vec<_> = parameters.collect();
+        let corrections = found.split_off(fitted.hypothesis.size());
+        (found, corrections)
+    }
+
+    /// Information of the fit, and variance of its gradient.
+    fn normal_matrices(
+        &self,
+        columns: &[Vec<f64>],
+        free: &[Free],
+        fitted: &Fitted,
+        scope: Scope,
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
+        let weights = self.data.weights(scope);
+        let scaled = |factors: &[f64]| -> Vec<Vec<f64>> {
+            let both = columns.iter().zip(free);
+            both.map(|(column, free)| {
+                column.iter().zip(factors).map(|(slope, factor)| slope * factor * free.typical).collect()
+            })
+            .collect()
+        };
+        let mut bread = normal_matrix(&scaled(&weights));
+        let spread = self.data.spread(&fitted.residuals, scope);
+        let inflated: Vec<f64> = weights.iter().zip(&spread).map(|(weight, spread)| weight * weight * spread).collect();
+        let mut filling = normal_matrix(&scaled(&inflated));
+        for (k, free) in free.iter().enumerate() {
+            let prior = free.prior.map_or(0.0, |(_, deviation)| (free.typical / deviation).powi(2));
+            // The small constant keeps a parameter without influence from spoiling the others.
+            bread[(k, k)] += prior + 1e-9;
+            filling[(k, k)] += prior + 1e-9;
+        }
+        (bread, filling)
+    }
+}
+
+/// Bounds of parameters of effects; a change of the size of the start matters.
+fn bounds(variables: &[&'static Variable], start: &Parameters) -> Vec<Free> {
+    let bounds = |variable: &&'static Variable| {
+        let start = declared(start, variable.name).1;
+        let span = (variable.max - variable.min).min(2.0 * variable.unit.nominal);
+        let typical = if start == 0.0 { 0.05 * span } else { start.abs() };
+        Free { start, lower: variable.min, upper: variable.max, typical, prior: None }
+    };
+    variables.iter().map(bounds).collect()
+}
+
+fn weighted(residuals: &[f64], weights: &[f64]) -> Vec<f64> {
+    residuals.iter().zip(weights).map(|(residual, weight)| residual * weight).collect()
 }

@@ -7,6 +7,7 @@
 //! nothing is wrong, or that the cause is unknown.
 
 mod candidates;
+mod noise;
 pub mod report;
 mod residuals;
 mod selection;
@@ -17,9 +18,12 @@ use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::simulation::replay;
 use crate::{Error, Result};
-use candidates::{Candidate, Fitted};
+use candidates::Bench;
 use residuals::Data;
+use residuals::Scope;
+use selection::{Chosen, Judged, Search};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
@@ -73,8 +77,8 @@ pub struct SignalErrors {
 pub struct Ranked {
     /// Name of the effect.
     pub effect: &'static str,
-    /// Held-out error of the model with this effect, relative to the error without.
-    pub relative_error: f64,
+    /// Share of the error beyond noise that this effect alone explains.
+    pub explained: f64,
     /// Evidence for the effect (natural logarithm, at the effective number of samples).
     pub evidence: f64,
 }
@@ -116,50 +120,72 @@ pub fn diagnose(
     for recording in recordings {
         replay(nominal, recording)?; // a model that cannot be simulated at all is the user's to mend
     }
-    let data = Data::new(recordings, nominal, tolerance)?;
     let cannot_follow = || Error::Recording {
         path: recordings[0].path.clone(),
         problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
     };
-    let baseline = Fitted::fit(&Candidate::corrections_only(), nominal, &data, tolerance).ok_or_else(cannot_follow)?;
+    let mut bench = Bench::new(Data::new(recordings, nominal)?, nominal, tolerance);
+    let first = bench.baseline().ok_or_else(cannot_follow)?;
+    bench.refine_noise(&first.residuals);
+    let baseline = bench.baseline().ok_or_else(cannot_follow)?;
     done("nominal");
-    let candidates: Vec<Fitted> = Candidate::all()
-        .iter()
-        .filter_map(|candidate| {
-            let fitted = Fitted::fit(candidate, nominal, &data, tolerance);
-            done(candidate.name());
-            fitted
-        })
-        .collect();
-    let chosen = selection::select(&baseline, candidates, data.noise_floor());
-    let nominal_errors = data.held_out_rms(nominal).ok_or_else(cannot_follow)?;
-    // Corrections that do not help on unseen samples are not made.
-    let without_cause = if baseline.beats(nominal, &data) { baseline.parameters } else { *nominal };
-    let extended = chosen.best.as_ref().map_or(without_cause, |best| best.parameters);
-    let extended_errors = data.held_out_rms(&extended).ok_or_else(cannot_follow)?;
-    let signals: Vec<SignalErrors> = data
-        .signals()
-        .into_iter()
-        .map(|signal| SignalErrors {
-            signal,
-            nominal_rms: nominal_errors[&signal],
-            extended_rms: extended_errors[&signal],
-            noise_rms: data.noise(signal),
-        })
-        .collect();
-    let weighted = |rms: fn(&SignalErrors) -> f64| {
-        signals.iter().map(|errors| (rms(errors) / errors.noise_rms).powi(2)).sum::<f64>().sqrt()
+    let chosen = Search::new(&mut bench, baseline, tolerance).run(done).ok_or_else(cannot_follow)?;
+    Ok(answer(&bench, nominal, chosen).ok_or_else(cannot_follow)?)
+}
+
+/// The choice in words and figures.
+fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnosis> {
+    let data = &bench.data;
+    let nominal_residuals = data.residuals(nominal)?;
+    let (parameters, corrections) = bench.intervals(&chosen.model, Scope::Training);
+    let nominal_errors = data.held_out_rms(&nominal_residuals);
+    let mut extended = chosen.model.parameters;
+    let mut extended_errors = data.held_out_rms(&chosen.model.residuals);
+    let weighted = |errors: &BTreeMap<Signal, f64>| {
+        let squares = errors.iter().map(|(signal, rms)| (rms / data.noise(*signal).level).powi(2));
+        squares.sum::<f64>().sqrt()
     };
-    let (before, after) = (weighted(|e| e.nominal_rms), weighted(|e| e.extended_rms));
-    let improvement = if before > 0.0 { 1.0 - after / before } else { 0.0 };
-    Ok(Diagnosis {
+    // Corrections that do not help on unseen samples are not made.
+    if chosen.model.hypothesis.parts.is_empty() && weighted(&extended_errors) > weighted(&nominal_errors) {
+        (extended, extended_errors) = (*nominal, nominal_errors.clone());
+    }
+    let (before, after) = (weighted(&nominal_errors), weighted(&extended_errors));
+    let signals = nominal_errors.iter().map(|(signal, nominal_rms)| SignalErrors {
+        signal: *signal,
+        nominal_rms: *nominal_rms,
+        extended_rms: extended_errors[signal],
+        noise_rms: data.noise(*signal).level,
+    });
+    let baseline = |judged: &Judged| Ranked {
+        effect: judged.fitted.hypothesis.parts[0].effect.name,
+        explained: judged.explained,
+        evidence: judged.evidence,
+    };
+    Some(Diagnosis {
         verdict: chosen.verdict,
-        causes: chosen.best.iter().filter_map(|best| best.cause(chosen.alternatives.clone())).collect(),
-        improvement,
-        signals,
+        causes: causes(&chosen, &parameters),
+        signals: signals.collect(),
+        improvement: if before > 0.0 { 1.0 - after / before } else { 0.0 },
         held_out: data.held_out(),
-        ranking: chosen.ranking,
-        corrections: chosen.best.as_ref().unwrap_or(&baseline).corrections.clone(),
+        ranking: chosen.singles.iter().map(baseline).collect(),
         extended,
+        corrections,
     })
+}
+
+/// The causes as they are told, the largest first.
+fn causes(chosen: &Chosen, parameters: &[FittedParameter]) -> Vec<Cause> {
+    let parts = chosen.model.hypothesis.parts.iter().zip(&chosen.alternatives);
+    let causes = parts.map(|(part, alternatives)| {
+        let effect = part.effect;
+        let own = |parameter: &&FittedParameter| parameter.name.split('.').next() == Some(effect.name);
+        Cause {
+            effect: effect.name,
+            sentence: chosen.model.parameters.effects.sentence(effect.name).unwrap_or_default(),
+            parameters: parameters.iter().filter(own).cloned().collect(),
+            alternatives: alternatives.clone(),
+            experiment: effect.experiment,
+        }
+    });
+    causes.collect()
 }

@@ -81,7 +81,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
     let ranking: Vec<Value> = diagnosis
         .ranking
         .iter()
-        .map(|r| json!({ "effect": r.effect, "relative_error": r.relative_error, "evidence": r.evidence }))
+        .map(|r| json!({ "effect": r.effect, "explained": r.explained, "evidence": r.evidence }))
         .collect();
     json!({
         "verdict": diagnosis.verdict,
@@ -267,7 +267,7 @@ fn html(diagnosis: &Diagnosis, exposing: &[String], plots: &[String]) -> String 
     let ranking: Vec<_> = diagnosis
         .ranking
         .iter()
-        .map(|r| context! { effect => r.effect, error => format!("{:.0} %", 100.0 * r.relative_error), evidence => format!("{:.0}", r.evidence) })
+        .map(|r| context! { effect => r.effect, explained => format!("{:.0} %", 100.0 * r.explained), evidence => format!("{:.0}", r.evidence) })
         .collect();
     let page = context! {
         headline => headline(diagnosis), causes, signals, ranking, plots => plots.to_vec(), exposing => exposing.to_vec(),

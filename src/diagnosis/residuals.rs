@@ -1,41 +1,64 @@
-//! Residuals of a model against recordings: how large they are allowed to be, and which of them no fit sees.
+//! Residuals of a model against recordings: how large they are, what noise alone would leave, which of them no fit sees.
 
+use super::noise::{self, Noise};
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
-use crate::simulation::{OUTPUTS, Replay, replay};
+use crate::simulation::{OUTPUTS, replay};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Share of each recording, from its start, that fits see when its end is held out.
 const TRAINING_SHARE: f64 = 0.6;
-/// Structural error of a nominal model beyond its coefficients, as a share of the declared tolerance and of the span of
-/// the signal: a polynomial is never quite the muscle.
-const STRUCTURE_SHARE: f64 = 0.2;
 /// Fewest samples of a recording from which anything can be concluded.
 const FEWEST_SAMPLES: usize = 50;
-/// Length of a block in s: errors of different blocks count as independent.
-const BLOCK: f64 = 2.0;
+/// Longest time in s over which neighbouring residuals are expected to hang together.
+const LONGEST_CORRELATION: f64 = 3.0;
+/// No sensor is better than this share of what it shows: data without any noise are simulated.
+const FINEST: f64 = 1e-5;
+
+/// The samples of one signal of one recording that can be compared.
+struct Segment {
+    recording: usize,
+    signal: Signal,
+    /// Positions within the recording.
+    samples: Vec<usize>,
+    /// Where they stand among all residuals.
+    range: Range<usize>,
+}
 
 /// Recordings with what is needed to judge residuals.
 pub struct Data<'a> {
     recordings: &'a [Recording],
     /// Time in s from which a recording is held out.
     held_out_from: Vec<f64>,
-    noise: BTreeMap<Signal, f64>,
-    /// Residuals of this size are expected of a sound model.
-    scale: BTreeMap<Signal, f64>,
+    segments: Vec<Segment>,
+    noise: BTreeMap<Signal, Noise>,
 }
 
-/// Squared, scaled residuals of held-out blocks.
-#[derive(Debug, Clone)]
-pub struct HeldOut {
-    /// Mean square per block, all signals together.
-    pub blocks: Vec<f64>,
-    /// Mean square over everything.
-    pub loss: f64,
-    /// Number of samples that are worth an independent one.
-    pub effective_samples: f64,
+/// How large the residuals of one signal in one recording are.
+#[derive(Debug, Clone, Copy)]
+pub struct Loss {
+    /// The signal.
+    pub signal: Signal,
+    /// Number of residuals.
+    pub samples: usize,
+    /// Mean square relative to that of the noise.
+    pub excess: f64,
+    /// Number of samples that are worth an independent one, judged from how these residuals hang together.
+    pub effective: f64,
+}
+
+/// Which samples are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// Everything.
+    All,
+    /// Those that fits may see.
+    Training,
+    /// Those that no fit saw.
+    HeldOut,
 }
 
 impl<'a> Data<'a> {
@@ -43,51 +66,25 @@ impl<'a> Data<'a> {
     ///
     /// # Errors
     /// [`Error::Recording`] where a recording is too short, or no measured signal can be judged.
-    pub fn new(recordings: &'a [Recording], nominal: &Parameters, tolerance: f64) -> Result<Self> {
+    pub fn new(recordings: &'a [Recording], nominal: &Parameters) -> Result<Self> {
         if let Some(short) = recordings.iter().find(|recording| recording.time.len() < FEWEST_SAMPLES) {
             let problem = format!("too short for a diagnosis: it takes at least {FEWEST_SAMPLES} samples");
             return Err(Error::Recording { path: short.path.clone(), problem });
         }
-        let replays: Vec<Replay> = recordings.iter().map(|r| replay(nominal, r)).collect::<Result<_>>()?;
-        // Recordings that have a signal as an output.
-        let with = |signal: Signal| {
-            let both = |(index, r): (usize, &Replay)| r.get(signal).and(recordings[index].get(signal)).map(|_| index);
-            replays.iter().enumerate().filter_map(both).collect::<Vec<_>>()
-        };
-        let (mut noise, mut scale) = (BTreeMap::new(), BTreeMap::new());
-        for signal in OUTPUTS {
-            let measured: Vec<&[f64]> = with(signal).into_iter().filter_map(|k| recordings[k].get(signal)).collect();
-            // A sensor that always shows the same says nothing of the model.
-            let spans = measured.iter().map(|values| span(values)).filter(|span| *span > 0.0);
-            let Some(smallest_span) = spans.reduce(f64::min) else { continue };
-            let finest = 1e-6 * smallest_span; // no sensor is better than a millionth of what it shows
-            let level = rms(&measured.iter().map(|values| noise_rms(values)).collect::<Vec<_>>()).max(finest);
-            noise.insert(signal, level);
-            scale.insert(signal, level.hypot(STRUCTURE_SHARE * tolerance * smallest_span));
-        }
-        let counts = |from: &[f64], signal: Signal| {
-            let mut counts = (0, 0);
-            for index in with(signal) {
-                let recording = &recordings[index];
-                let values = recording.get(signal).unwrap_or_default();
-                for (time, _) in recording.time.iter().zip(values).filter(|(_, value)| !value.is_nan()) {
-                    let count = if *time < from[index] { &mut counts.0 } else { &mut counts.1 };
-                    *count += 1;
-                }
-            }
-            counts
-        };
-        let judged = |from: &[f64], signal: &Signal| {
-            let (seen, unseen) = counts(from, *signal);
-            seen >= FEWEST_SAMPLES / 2 && unseen >= FEWEST_SAMPLES / 2
+        let mut data = Self {
+            recordings,
+            held_out_from: last_recording(recordings),
+            segments: segments(recordings, nominal)?,
+            noise: BTreeMap::new(),
         };
         // The last of several recordings is held out, if all signals can be both fitted and judged then.
-        let mut held_out_from = last_recording(recordings);
-        if recordings.len() == 1 || !scale.keys().all(|signal| judged(&held_out_from, signal)) {
-            held_out_from = last_part(recordings);
-            scale.retain(|signal, _| judged(&held_out_from, signal));
+        if recordings.len() == 1 || !data.signals().into_iter().all(|signal| data.is_judged(signal)) {
+            data.held_out_from = last_part(recordings);
+            let judged: Vec<Signal> = data.signals().into_iter().filter(|signal| data.is_judged(*signal)).collect();
+            data.segments.retain(|segment| judged.contains(&segment.signal));
+            number(&mut data.segments);
         }
-        if scale.is_empty() {
+        if data.segments.is_empty() {
             return Err(Error::Recording {
                 path: recordings[0].path.clone(),
                 problem: "no output was measured that changes and reaches to the end of the recording; add `force`, \
@@ -95,23 +92,59 @@ impl<'a> Data<'a> {
                     .to_owned(),
             });
         }
-        Ok(Self { recordings, held_out_from, noise, scale })
-    }
-
-    /// Loss that sensor noise alone leaves.
-    pub fn noise_floor(&self) -> f64 {
-        let shares = self.scale.iter().map(|(signal, scale)| (self.noise[signal] / scale).powi(2));
-        shares.sum::<f64>() / self.scale.len() as f64
+        if let Some(residuals) = data.residuals(nominal) {
+            data.noise = data.noise_in(&residuals);
+        }
+        Ok(data)
     }
 
     /// The signals that can be compared.
     pub fn signals(&self) -> Vec<Signal> {
-        self.scale.keys().copied().collect()
+        let mut signals: Vec<Signal> = self.segments.iter().map(|segment| segment.signal).collect();
+        signals.sort();
+        signals.dedup();
+        signals
     }
 
-    /// Rms noise of a signal's sensor, SI.
-    pub fn noise(&self, signal: Signal) -> f64 {
+    /// Noise of a signal's sensor, SI.
+    pub fn noise(&self, signal: Signal) -> Noise {
         self.noise[&signal]
+    }
+
+    /// Noise per signal as the residuals of a model show it; they should come from a model that is about right.
+    pub fn noise_in(&self, residuals: &[f64]) -> BTreeMap<Signal, Noise> {
+        let estimates = |signal: Signal| {
+            let of_signal = self.segments.iter().filter(move |segment| segment.signal == signal);
+            of_signal.map(|segment| {
+                let series = self.series(segment, residuals);
+                let noise = noise::estimate(&series, self.period(segment.recording));
+                let finest = FINEST * span(self.measured(segment));
+                (segment.samples.len() as f64, noise.level.max(finest).powi(2), noise.inflation)
+            })
+        };
+        let pooled = |signal: Signal| {
+            let weight: f64 = estimates(signal).map(|(n, ..)| n).sum();
+            let variance = estimates(signal).map(|(n, variance, _)| n * variance).sum::<f64>() / weight;
+            let inflation = estimates(signal).map(|(n, _, inflation)| n * inflation).sum::<f64>() / weight;
+            Noise { level: variance.sqrt(), inflation }
+        };
+        self.signals().into_iter().map(|signal| (signal, pooled(signal))).collect()
+    }
+
+    /// Smallest span of a signal among the recordings, SI.
+    pub fn span(&self, signal: Signal) -> f64 {
+        let segments = self.segments.iter().filter(|segment| segment.signal == signal);
+        segments.map(|segment| span(self.measured(segment))).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Takes what a better model shows of the noise, where that is less.
+    pub fn refine_noise(&mut self, residuals: &[f64]) {
+        for (signal, seen) in self.noise_in(residuals) {
+            let known = self.noise.entry(signal).or_insert(seen);
+            if seen.level < known.level {
+                *known = seen;
+            }
+        }
     }
 
     /// What is held out, in words.
@@ -123,83 +156,145 @@ impl<'a> Data<'a> {
         words.collect::<Vec<_>>().join(", ")
     }
 
-    /// Scaled residuals of the samples that fits may see; `None` where the model cannot be simulated.
-    pub fn training_residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
-        let replays = self.replays(parameters)?;
-        let mut all = Vec::new();
-        for (index, replay) in replays.iter().enumerate() {
-            self.each_residual(index, replay, |_, time, scaled| {
-                if time < self.held_out_from[index] {
-                    all.push(scaled);
-                }
-            });
+    /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
+    /// simulated.
+    pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+        let replays: Vec<_> =
+            self.recordings.par_iter().map(|recording| replay(parameters, recording).ok()).collect::<Option<_>>()?;
+        let mut all = Vec::with_capacity(self.segments.last().map_or(0, |segment| segment.range.end));
+        for segment in &self.segments {
+            let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);
+            all.extend(segment.samples.iter().map(|&k| measured[k] - simulated[k]));
         }
-        Some(all)
+        all.iter().all(|residual| residual.is_finite()).then_some(all)
     }
 
-    /// Number of training samples per independent one, from the autocorrelation of a model's residuals.
-    pub fn samples_per_independent(&self, parameters: &Parameters) -> f64 {
-        let residuals = self.training_residuals(parameters).unwrap_or_default();
-        let rho = autocorrelation(&residuals);
-        (1.0 + rho) / (1.0 - rho)
-    }
-
-    /// Squared residuals of the samples that no fit saw; `None` where the model cannot be simulated.
-    pub fn held_out_loss(&self, parameters: &Parameters) -> Option<HeldOut> {
-        let replays = self.replays(parameters)?;
-        let mut blocks: BTreeMap<(usize, u64), (f64, usize)> = BTreeMap::new();
-        let mut series = Vec::new();
-        for (index, replay) in replays.iter().enumerate() {
-            self.each_residual(index, replay, |_, time, scaled| {
-                if time >= self.held_out_from[index] {
-                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                    let block = ((time - self.held_out_from[index].max(self.recordings[index].time[0])) / BLOCK) as u64;
-                    let entry = blocks.entry((index, block)).or_default();
-                    *entry = (entry.0 + scaled * scaled, entry.1 + 1);
-                    series.push(scaled);
-                }
-            });
+    /// Factor per residual that makes it count as much as it is worth: slow noise and frequent samples count less.
+    /// Residuals out of scope count nothing.
+    pub fn weights(&self, scope: Scope) -> Vec<f64> {
+        let of = |segment: &Segment| {
+            let noise = self.noise[&segment.signal];
+            1.0 / (noise.level * noise.inflation.sqrt())
+        };
+        let mut weights = Vec::new();
+        for segment in &self.segments {
+            let weight = of(segment);
+            weights.extend(segment.samples.iter().map(|&k| if self.is_in(scope, segment, k) { weight } else { 0.0 }));
         }
-        let rho = autocorrelation(&series);
-        Some(HeldOut {
-            blocks: blocks.values().map(|(sum, count)| sum / *count as f64).collect(),
-            loss: series.iter().map(|r| r * r).sum::<f64>() / series.len() as f64,
-            effective_samples: series.len() as f64 * (1.0 - rho) / (1.0 + rho),
-        })
+        weights
     }
 
-    /// Rms of each signal's residual on the samples that no fit saw, SI; `None` where the model cannot be simulated.
-    pub fn held_out_rms(&self, parameters: &Parameters) -> Option<BTreeMap<Signal, f64>> {
-        let replays = self.replays(parameters)?;
-        let mut sums: BTreeMap<Signal, (f64, usize)> = self.signals().into_iter().map(|s| (s, (0.0, 0))).collect();
-        for (index, replay) in replays.iter().enumerate() {
-            self.each_residual(index, replay, |signal, time, scaled| {
-                if time >= self.held_out_from[index] {
-                    let entry = sums.entry(signal).or_default();
-                    *entry = (entry.0 + scaled * scaled, entry.1 + 1);
-                }
+    /// How large residuals are, per signal and recording.
+    pub fn losses(&self, residuals: &[f64], scope: Scope) -> Vec<Loss> {
+        let in_scope = self.segments.iter().map(|segment| {
+            let level = self.noise[&segment.signal].level;
+            let both = segment.samples.iter().zip(&residuals[segment.range.clone()]);
+            let scaled: Vec<f64> =
+                both.filter(|(k, _)| self.is_in(scope, segment, **k)).map(|(_, residual)| residual / level).collect();
+            (segment, scaled)
+        });
+        in_scope
+            .filter(|(_, scaled)| !scaled.is_empty())
+            .map(|(segment, scaled)| Loss {
+                signal: segment.signal,
+                samples: scaled.len(),
+                excess: mean_square(&scaled),
+                effective: effective_samples(&scaled, self.period(segment.recording)),
+            })
+            .collect()
+    }
+
+    /// Per residual, the root of the variance that counts when many of them are added up: their size and how long they
+    /// hang together.
+    pub fn spread(&self, residuals: &[f64], scope: Scope) -> Vec<f64> {
+        let mut losses = self.losses(residuals, scope).into_iter().peekable();
+        let mut spread = Vec::with_capacity(residuals.len());
+        for segment in &self.segments {
+            let noise = self.noise[&segment.signal];
+            let seen = segment.samples.iter().any(|&k| self.is_in(scope, segment, k));
+            let own = losses.next_if(|loss| seen && loss.signal == segment.signal);
+            let size = own.map_or(0.0, |loss| {
+                let inflation = (loss.samples as f64 / loss.effective).max(noise.inflation);
+                noise.level * (loss.excess * inflation).sqrt()
             });
+            spread.extend(segment.samples.iter().map(|_| size));
         }
-        Some(sums.into_iter().map(|(s, (sum, n))| (s, self.scale[&s] * (sum / n.max(1) as f64).sqrt())).collect())
+        spread
     }
 
-    fn replays(&self, parameters: &Parameters) -> Option<Vec<Replay>> {
-        self.recordings.par_iter().map(|recording| replay(parameters, recording).ok()).collect()
+    /// Rms of each signal's residual on the samples that no fit saw, SI.
+    pub fn held_out_rms(&self, residuals: &[f64]) -> BTreeMap<Signal, f64> {
+        let mut sums: BTreeMap<Signal, (f64, f64)> = BTreeMap::new();
+        for loss in self.losses(residuals, Scope::HeldOut) {
+            let (sum, count) = sums.entry(loss.signal).or_default();
+            *sum += loss.excess * loss.samples as f64;
+            *count += loss.samples as f64;
+        }
+        sums.into_iter()
+            .map(|(signal, (sum, count))| (signal, self.noise[&signal].level * (sum / count).sqrt()))
+            .collect()
     }
 
-    /// Every residual of a recording: signal, time in s, measured − simulated relative to its scale.
-    fn each_residual(&self, index: usize, replay: &Replay, mut see: impl FnMut(Signal, f64, f64)) {
-        let recording = &self.recordings[index];
-        for (signal, scale) in &self.scale {
-            if let (Some(measured), Some(simulated)) = (recording.get(*signal), replay.get(*signal)) {
-                for (k, time) in recording.time.iter().enumerate() {
-                    let residual = measured[k] - simulated[k];
-                    if residual.is_finite() {
-                        see(*signal, *time, residual / scale);
-                    }
-                }
+    fn is_in(&self, scope: Scope, segment: &Segment, sample: usize) -> bool {
+        let held_out = self.recordings[segment.recording].time[sample] >= self.held_out_from[segment.recording];
+        match scope {
+            Scope::All => true,
+            Scope::Training => !held_out,
+            Scope::HeldOut => held_out,
+        }
+    }
+
+    fn is_judged(&self, signal: Signal) -> bool {
+        let count = |scope: Scope| {
+            let segments = self.segments.iter().filter(|segment| segment.signal == signal);
+            segments.map(|s| s.samples.iter().filter(|k| self.is_in(scope, s, **k)).count()).sum::<usize>()
+        };
+        count(Scope::Training) >= FEWEST_SAMPLES / 2 && count(Scope::HeldOut) >= FEWEST_SAMPLES / 2
+    }
+
+    fn measured(&self, segment: &Segment) -> &[f64] {
+        self.recordings[segment.recording].get(segment.signal).unwrap_or_default()
+    }
+
+    /// Residuals of a segment at all times of its recording, NaN where there are none.
+    fn series(&self, segment: &Segment, residuals: &[f64]) -> Vec<f64> {
+        let mut series = vec![f64::NAN; self.recordings[segment.recording].time.len()];
+        segment.samples.iter().zip(&residuals[segment.range.clone()]).for_each(|(&k, residual)| series[k] = *residual);
+        series
+    }
+
+    /// Usual time between samples of a recording, s.
+    fn period(&self, recording: usize) -> f64 {
+        let time = &self.recordings[recording].time;
+        let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let middle = steps.len() / 2;
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}
+
+/// The samples that can be compared: measured, changing, and an output of the simulation.
+fn segments(recordings: &[Recording], nominal: &Parameters) -> Result<Vec<Segment>> {
+    let mut segments = Vec::new();
+    for (recording, read) in recordings.iter().enumerate() {
+        let simulated = replay(nominal, read)?;
+        for signal in OUTPUTS {
+            let (Some(measured), Some(_)) = (read.get(signal), simulated.get(signal)) else { continue };
+            let samples: Vec<usize> = (0..measured.len()).filter(|&k| measured[k].is_finite()).collect();
+            // A sensor that always shows the same says nothing of the model.
+            if span(measured) > 0.0 {
+                segments.push(Segment { recording, signal, samples, range: 0..0 });
             }
         }
+    }
+    number(&mut segments);
+    Ok(segments)
+}
+
+fn number(segments: &mut [Segment]) {
+    let mut end = 0;
+    for segment in segments {
+        segment.range = end..end + segment.samples.len();
+        end = segment.range.end;
     }
 }
 
@@ -215,23 +310,8 @@ fn last_part(recordings: &[Recording]) -> Vec<f64> {
     recordings.iter().map(|recording| from(&recording.time)).collect()
 }
 
-/// Rms noise of a sensor: the scatter about straight lines through neighbouring samples, robust against real motion,
-/// and at least the noise of rounding to the steps that the values show.
-pub fn noise_rms(values: &[f64]) -> f64 {
-    let present: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
-    let mut bends: Vec<f64> = present.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    let mut steps: Vec<f64> = present.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0).collect();
-    bends.sort_by(f64::total_cmp);
-    steps.sort_by(f64::total_cmp);
-    let median = bends.get(bends.len() / 2).copied().unwrap_or(0.0);
-    let quantum = steps.first().copied().unwrap_or(0.0);
-    // 1.4826 makes a median deviation a standard deviation; the bend of white noise has √6 of it.
-    let scatter = 1.4826 * median / 6.0_f64.sqrt();
-    scatter.max(quantum / 12.0_f64.sqrt())
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+fn mean_square(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
 }
 
 /// Largest less smallest value; negative where there is none.
@@ -240,11 +320,18 @@ fn span(values: &[f64]) -> f64 {
     present().fold(f64::NEG_INFINITY, f64::max) - present().fold(f64::INFINITY, f64::min)
 }
 
-/// Correlation of neighbours, within what leaves an effective sample size.
-fn autocorrelation(series: &[f64]) -> f64 {
+/// Number of samples divided by 1 + 2 Σ ρ, the sum of the autocorrelations up to the first that is negative
+/// (initial positive sequence, C. Geyer 1992, doi 10.1214/ss/1177011137).
+fn effective_samples(series: &[f64], period: f64) -> f64 {
     let power: f64 = series.iter().map(|r| r * r).sum();
-    let together: f64 = series.windows(2).map(|pair| pair[0] * pair[1]).sum();
-    if power > 0.0 { (together / power).clamp(0.0, 0.999) } else { 0.0 }
+    if power <= 0.0 {
+        return series.len() as f64;
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let longest = ((LONGEST_CORRELATION / period) as usize).min(series.len() / 4);
+    let correlation = |lag: usize| series.iter().zip(&series[lag..]).map(|(a, b)| a * b).sum::<f64>() / power;
+    let sum: f64 = (1..=longest).map(correlation).take_while(|rho| *rho > 0.0).sum();
+    series.len() as f64 / (1.0 + 2.0 * sum)
 }
 
 #[cfg(test)]
@@ -252,22 +339,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_is_told_from_motion() {
-        // A slow sine of amplitude 1 with uniform noise of 1e-3 rms from a linear congruential generator.
-        let mut seed = 1_u32;
-        let values: Vec<f64> = (0..4000)
-            .map(|k| {
-                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                let noise = (f64::from(seed) / f64::from(u32::MAX) - 0.5) * 12.0_f64.sqrt() * 1e-3;
-                (f64::from(k) * 0.002).sin() + noise
-            })
-            .collect();
-        let estimate = noise_rms(&values);
-        assert!((0.7e-3..1.4e-3).contains(&estimate), "{estimate}");
-    }
-
-    #[test]
-    fn a_constant_signal_has_no_noise() {
-        assert_eq!(noise_rms(&[1.0; 50]), 0.0);
+    fn neighbours_that_hang_together_are_worth_less() {
+        let alternating: Vec<f64> = (0..1000).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        assert_eq!(effective_samples(&alternating, 0.01), 1000.0);
+        let blocks: Vec<f64> = (0..1000).map(|k| if k / 20 % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        let worth = effective_samples(&blocks, 0.01);
+        assert!((30.0..200.0).contains(&worth), "{worth}");
     }
 }

@@ -27,6 +27,12 @@ crate::variables::variables! {
         area_scale: f64 = 1.0, ONE, (0.1..=10.0);
         /// Correction of the elastic force: this muscle against the coefficients
         elastic_scale: f64 = 1.0, ONE, (0.1..=10.0);
+        /// Correction of the virtual area that grows with contraction
+        area_tilt: f64 = 0.0, ONE, (-1.0..=1.0);
+        /// Correction of the virtual area in the middle of the stroke against its ends
+        area_bend: f64 = 0.0, ONE, (-1.0..=1.0);
+        /// Correction of the elastic force that grows with contraction
+        elastic_tilt: f64 = 0.0, ONE, (-1.0..=1.0);
     }
 }
 
@@ -37,6 +43,25 @@ impl Muscle {
     pub fn diameter(&self, contraction: f64) -> f64 {
         let length = self.rest_length - contraction;
         (self.thread_length.powi(2) - length.powi(2)).sqrt() / (self.turns * PI)
+    }
+
+    /// Place within the stroke: -1 at rest length, 1 at a quarter of it, which no FESTO muscle exceeds by much.
+    #[inline]
+    fn stroke(&self, contraction: f64) -> f64 {
+        8.0 * contraction / self.rest_length - 1.0
+    }
+
+    /// Factor on the virtual area at a contraction in m: Legendre polynomials over the stroke.
+    #[inline]
+    fn area_correction(&self, contraction: f64) -> f64 {
+        let stroke = self.stroke(contraction);
+        self.area_scale + self.area_tilt * stroke + self.area_bend * (1.5 * stroke * stroke - 0.5)
+    }
+
+    /// Factor on the elastic force at a contraction in m.
+    #[inline]
+    fn elastic_correction(&self, contraction: f64) -> f64 {
+        self.elastic_scale + self.elastic_tilt * self.stroke(contraction)
     }
 
     /// Volume in m³ of the braid, taken as a cylinder, at a contraction in m (thesis eq. 3.6).
@@ -126,13 +151,13 @@ impl ForceModels {
     /// Virtual area in m² of the chosen model, with the muscle's correction.
     #[inline]
     pub fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64 {
-        muscle.area_scale * self.chosen(muscle.force_model).virtual_area(muscle, contraction)
+        muscle.area_correction(contraction) * self.chosen(muscle.force_model).virtual_area(muscle, contraction)
     }
 
     /// Elastic force in N of the chosen model, with the muscle's correction.
     #[inline]
     pub fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64 {
-        muscle.elastic_scale * self.chosen(muscle.force_model).elastic_force(muscle, contraction)
+        muscle.elastic_correction(contraction) * self.chosen(muscle.force_model).elastic_force(muscle, contraction)
     }
 
     /// Static pull in N of the chosen model.
