@@ -2,8 +2,8 @@
 //!
 //! # Model
 //! Levenberg–Marquardt on Σ r², with steps projected onto the bounds and parameters at a bound that push outwards left
-//! out of the step. Derivatives are forward differences, taken in parallel; those of parameters that act linearly are
-//! known beforehand and cost nothing. A prior counts as one more residual.
+//! out of the step. Derivatives are forward differences, taken in parallel; those of parameters that act almost linearly
+//! may be given and cost nothing then. A prior counts as one more residual.
 //!
 //! # Reference
 //! D. Marquardt (1963), doi 10.1137/0111030; projection as in C. Kanzow, N. Yamashita, M. Fukushima (2004),
@@ -27,15 +27,13 @@ pub struct Free {
     pub prior: Option<(f64, f64)>,
 }
 
-/// A parameter whose effect on the residuals is known and linear.
-#[derive(Debug, Clone)]
-pub struct Linear {
-    /// The parameter.
-    pub free: Free,
-    /// Change of every residual per unit of the parameter.
-    pub column: Vec<f64>,
-    /// Value of the parameter that the residuals are computed with.
-    pub origin: f64,
+/// When a fit stops.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Most iterations.
+    pub iterations: usize,
+    /// Relative decrease of the cost in one iteration below which nothing more is expected.
+    pub small_decrease: f64,
 }
 
 /// How a fit ended.
@@ -52,7 +50,7 @@ pub enum Ended {
 /// What a fit found.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// Values of the parameters, those that act linearly last.
+    /// Values of the parameters.
     pub parameters: Vec<f64>,
     /// Residuals there, priors not among them; shape `(n_residuals,)`.
     pub residuals: Vec<f64>,
@@ -62,16 +60,15 @@ pub struct Fit {
     pub ended: Ended,
 }
 
-/// Relative decrease of the cost below which a fit has converged.
-const SMALL_DECREASE: f64 = 1e-6;
 /// Damping above which no smaller step is worth a try.
 const LARGEST_DAMPING: f64 = 1e6;
 
 /// What is minimised.
 struct Problem<'a, R> {
     residuals: &'a R,
-    free: Vec<Free>,
-    linear: &'a [Linear],
+    free: &'a [Free],
+    /// Derivatives of the residuals by the last parameters, as far as they are known.
+    known: &'a [Vec<f64>],
 }
 
 /// A place with its residuals.
@@ -81,21 +78,20 @@ struct Place {
     cost: f64,
 }
 
-/// Minimises the sum of squares of `residuals`, which gives `None` where it cannot be computed; it sees the parameters
-/// `free`, and those that are `linear` are added.
-pub fn fit<R>(residuals: &R, free: &[Free], linear: &[Linear], most_iterations: usize) -> Fit
+/// Minimises the sum of squares of `residuals`, which gives `None` where it cannot be computed. `known` are derivatives of
+/// the residuals by the last parameters, good enough to find the way.
+pub fn fit<R>(residuals: &R, free: &[Free], known: &[Vec<f64>], effort: Effort) -> Fit
 where
     R: Fn(&[f64]) -> Option<Vec<f64>> + Sync,
 {
-    let all: Vec<Free> = free.iter().copied().chain(linear.iter().map(|l| l.free)).collect();
-    let problem = Problem { residuals, free: all, linear };
-    let start: Vec<f64> = problem.free.iter().map(|f| f.start.clamp(f.lower, f.upper)).collect();
+    let problem = Problem { residuals, free, known };
+    let start: Vec<f64> = free.iter().map(|f| f.start.clamp(f.lower, f.upper)).collect();
     let Some(mut current) = problem.place(&start) else {
         return Fit { parameters: start, residuals: Vec::new(), cost: f64::INFINITY, ended: Ended::NoStart };
     };
     let mut damping = 1e-3;
     let mut ended = Ended::IterationLimit;
-    for _ in 0..most_iterations {
+    for _ in 0..effort.iterations {
         let columns = problem.columns(&current);
         let (normal, gradient) = problem.normal_equations(&columns, &current);
         let Some(better) = problem.better(&normal, &gradient, &current, &mut damping) else {
@@ -104,7 +100,7 @@ where
         };
         let decrease = current.cost - better.cost;
         current = better;
-        if decrease <= SMALL_DECREASE * current.cost {
+        if decrease <= effort.small_decrease * current.cost {
             ended = Ended::Converged;
             break;
         }
@@ -112,7 +108,7 @@ where
     Fit { parameters: current.parameters, residuals: current.residuals, cost: current.cost, ended }
 }
 
-/// Derivatives of the residuals by the free parameters at a place, one column each; differences like those of [`fit`].
+/// Derivatives of the residuals by the first of the parameters at a place, one column each, as [`fit`] takes them.
 pub fn derivatives<R>(residuals: &R, free: &[Free], at: &[f64], here: &[f64]) -> Vec<Vec<f64>>
 where
     R: Fn(&[f64]) -> Option<Vec<f64>> + Sync,
@@ -136,36 +132,22 @@ fn all_finite(values: &[f64]) -> bool {
 }
 
 impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
-    fn nonlinear(&self) -> usize {
-        self.free.len() - self.linear.len()
-    }
-
     fn place(&self, parameters: &[f64]) -> Option<Place> {
-        let mut residuals = (self.residuals)(&parameters[..self.nonlinear()]).filter(|r| all_finite(r))?;
-        for (linear, value) in self.linear.iter().zip(&parameters[self.nonlinear()..]) {
-            let change = value - linear.origin;
-            residuals.iter_mut().zip(&linear.column).for_each(|(r, slope)| *r += change * slope);
-        }
-        let known = self.free.iter().zip(parameters).filter_map(|(free, value)| {
+        let residuals = (self.residuals)(parameters).filter(|r| all_finite(r))?;
+        let priors = self.free.iter().zip(parameters).filter_map(|(free, value)| {
             let (mean, deviation) = free.prior?;
             Some(((value - mean) / deviation).powi(2))
         });
-        let cost = residuals.iter().map(|r| r * r).sum::<f64>() + known.sum::<f64>();
+        let cost = residuals.iter().map(|r| r * r).sum::<f64>() + priors.sum::<f64>();
         Some(Place { parameters: parameters.to_vec(), residuals, cost })
     }
 
     /// ∂r/∂parameter times the typical change, one column per parameter.
     fn columns(&self, at: &Place) -> Vec<Vec<f64>> {
-        let nonlinear = self.nonlinear();
-        let without_linear = |parameters: &[f64]| {
-            let mut all = at.parameters.clone();
-            all[..nonlinear].copy_from_slice(parameters);
-            self.place(&all).map(|place| place.residuals)
-        };
-        let mut columns =
-            derivatives(&without_linear, &self.free[..nonlinear], &at.parameters[..nonlinear], &at.residuals);
-        columns.extend(self.linear.iter().map(|linear| linear.column.clone()));
-        for (column, free) in columns.iter_mut().zip(&self.free) {
+        let unknown = &self.free[..self.free.len() - self.known.len()];
+        let mut columns = derivatives(self.residuals, unknown, &at.parameters, &at.residuals);
+        columns.extend(self.known.iter().cloned());
+        for (column, free) in columns.iter_mut().zip(self.free) {
             column.iter_mut().for_each(|value| *value *= free.typical);
         }
         columns
@@ -189,7 +171,7 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
     /// The next place whose cost is smaller, if there is one.
     fn better(&self, normal: &DMatrix<f64>, gradient: &DVector<f64>, from: &Place, damping: &mut f64) -> Option<Place> {
         while *damping <= LARGEST_DAMPING {
-            let trial = step(normal, gradient, &self.free, &from.parameters, *damping);
+            let trial = step(normal, gradient, self.free, &from.parameters, *damping);
             if let Some(better) = self.place(&trial).filter(|trial| trial.cost < from.cost) {
                 *damping = (*damping * 0.1).max(1e-12);
                 return Some(better);
@@ -242,7 +224,7 @@ fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, free: &[Free], parameter
 mod tests {
     use super::*;
 
-    const MOST: usize = 60;
+    const EFFORT: Effort = Effort { iterations: 60, small_decrease: 1e-6 };
 
     fn free(start: f64, lower: f64, upper: f64) -> Free {
         Free { start, lower, upper, typical: 1.0, prior: None }
@@ -251,7 +233,7 @@ mod tests {
     #[test]
     fn rosenbrock_is_solved() {
         let rosenbrock = |p: &[f64]| Some(vec![1.0 - p[0], 10.0 * (p[1] - p[0] * p[0])]);
-        let found = fit(&rosenbrock, &[free(-1.2, -5.0, 5.0), free(1.0, -5.0, 5.0)], &[], MOST);
+        let found = fit(&rosenbrock, &[free(-1.2, -5.0, 5.0), free(1.0, -5.0, 5.0)], &[], EFFORT);
         assert_eq!(found.ended, Ended::Converged);
         assert!((found.parameters[0] - 1.0).abs() < 1e-3 && (found.parameters[1] - 1.0).abs() < 2e-3, "{found:?}");
     }
@@ -260,25 +242,25 @@ mod tests {
     fn bounds_hold_and_the_rest_is_still_optimal() {
         // Minimum of (x - 3)² + (x + y)² with x <= 1 is x = 1, y = -1.
         let residuals = |p: &[f64]| Some(vec![p[0] - 3.0, p[0] + p[1]]);
-        let found = fit(&residuals, &[free(0.0, -1.0, 1.0), free(0.0, -5.0, 5.0)], &[], MOST);
+        let found = fit(&residuals, &[free(0.0, -1.0, 1.0), free(0.0, -5.0, 5.0)], &[], EFFORT);
         assert_eq!(found.parameters[0], 1.0);
         assert!((found.parameters[1] + 1.0).abs() < 1e-6, "{found:?}");
     }
 
     #[test]
     fn a_parameter_without_influence_stays() {
-        let found = fit(&|p: &[f64]| Some(vec![p[0] - 2.0]), &[free(0.0, -5.0, 5.0), free(0.3, -5.0, 5.0)], &[], MOST);
+        let found =
+            fit(&|p: &[f64]| Some(vec![p[0] - 2.0]), &[free(0.0, -5.0, 5.0), free(0.3, -5.0, 5.0)], &[], EFFORT);
         assert!((found.parameters[0] - 2.0).abs() < 1e-6);
         assert!((found.parameters[1] - 0.3).abs() < 1e-9);
     }
 
     #[test]
-    fn a_linear_parameter_and_a_prior_are_solved_together() {
-        // (x - 1)² + (x + y - 5)² + (y - 1)² with y linear: the minimum is x = 2, y = 2.
-        let residuals = |p: &[f64]| Some(vec![p[0] - 1.0, p[0] - 5.0]);
-        let known = Free { prior: Some((1.0, 1.0)), ..free(0.0, -9.0, 9.0) };
-        let linear = Linear { free: known, column: vec![0.0, 1.0], origin: 0.0 };
-        let found = fit(&residuals, &[free(0.0, -9.0, 9.0)], &[linear], MOST);
+    fn a_known_derivative_and_a_prior_are_used() {
+        // (x - 1)² + (x + y - 5)² + (y - 1)², the derivatives by y given: the minimum is x = 2, y = 2.
+        let residuals = |p: &[f64]| Some(vec![p[0] - 1.0, p[0] + p[1] - 5.0]);
+        let y = Free { prior: Some((1.0, 1.0)), ..free(0.0, -9.0, 9.0) };
+        let found = fit(&residuals, &[free(0.0, -9.0, 9.0), y], &[vec![0.0, 1.0]], EFFORT);
         assert!((found.parameters[0] - 2.0).abs() < 1e-6 && (found.parameters[1] - 2.0).abs() < 1e-6, "{found:?}");
         assert!((found.cost - 3.0).abs() < 1e-9 && found.residuals.len() == 2);
     }

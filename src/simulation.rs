@@ -137,7 +137,7 @@ fn mean(values: &[f64]) -> f64 {
 
 /// Rate of change at every sample: slope of the least-squares line through the nearest samples, which keeps the noise
 /// of a position sensor out of the velocity.
-fn slopes(time: &[f64], values: &[f64]) -> Vec<f64> {
+pub fn slopes(time: &[f64], values: &[f64]) -> Vec<f64> {
     const HALF_WINDOW: usize = 4;
     (0..time.len())
         .map(|k| {

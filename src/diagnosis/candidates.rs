@@ -2,7 +2,7 @@
 
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::{Description, Freed};
-use crate::least_squares::{self, Ended, Free, Linear, derivatives, normal_matrix};
+use crate::least_squares::{self, Effort, Ended, Free, derivatives, normal_matrix};
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
 use nalgebra::DMatrix;
@@ -13,8 +13,10 @@ const COEFFICIENTS: [&str; 4] = ["muscle.area_scale", "muscle.elastic_scale", "m
 const SHAPES: [&str; 3] = ["muscle.area_tilt", "muscle.area_bend", "muscle.elastic_tilt"];
 /// Expected size of a correction of shape, as a share of the declared tolerance.
 const SHAPE_SHARE: f64 = 0.2;
-/// Iterations of a fit that need not be exact, and of one that counts.
-const ITERATIONS: (usize, usize) = (12, 25);
+/// Of a fit that only has to show what a hypothesis is worth.
+const ROUGH: Effort = Effort { iterations: 12, small_decrease: 1e-3 };
+/// Of a fit whose parameters count.
+const EXACT: Effort = Effort { iterations: 30, small_decrease: 1e-6 };
 
 /// A parameter as fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +107,7 @@ pub struct Fitted {
     pub hypothesis: Hypothesis,
     /// The whole model.
     pub parameters: Parameters,
-    /// Measured − simulated in SI, as [`Data::residuals`] gives them; with corrections to first order in a quick fit.
+    /// Measured − simulated in SI, as [`Data::residuals`] gives them.
     pub residuals: Vec<f64>,
     /// How large they are, on all samples.
     pub losses: Vec<Loss>,
@@ -155,24 +157,43 @@ impl<'a> Bench<'a> {
     ///
     /// `None` where the nominal model cannot be simulated.
     pub fn baseline(&mut self) -> Option<Fitted> {
-        let baseline = self.fit(&Hypothesis::default(), self.nominal, Scope::All)?;
-        let (variables, free): (Vec<_>, Vec<_>) = self.corrections.iter().copied().unzip();
-        let at: Vec<f64> = variables.iter().map(|v| declared(&baseline.parameters, v.name).1).collect();
-        let residuals = |values: &[f64]| self.data.residuals(&with_values(self.nominal, &variables, values));
-        self.slopes = derivatives(&residuals, &free, &at, &baseline.residuals);
-        Some(baseline)
+        let nominal = Hypothesis::default();
+        let first = self.exact_fit(&nominal, self.nominal, Scope::All)?;
+        self.slopes = self.slopes_at(&first.parameters, &first.residuals);
+        self.fit(&nominal, &first.parameters, Scope::All, &self.slopes, EXACT)
     }
 
-    /// Fits a hypothesis on the samples in scope, starting from a model.
+    /// Fits a hypothesis on all samples, starting from a model, to see what it is worth. What the corrections do to the
+    /// residuals is taken from the baseline, so that an iteration costs one simulation per parameter of the effects.
     ///
     /// `None` where the start cannot be simulated.
-    pub fn fit(&self, hypothesis: &Hypothesis, start: &Parameters, scope: Scope) -> Option<Fitted> {
+    pub fn rough_fit(&self, hypothesis: &Hypothesis, start: &Parameters) -> Option<Fitted> {
+        self.fit(hypothesis, start, Scope::All, &self.slopes, ROUGH)
+    }
+
+    /// Fits a hypothesis to the end on the samples in scope, starting from a model that is about right.
+    ///
+    /// `None` where the start cannot be simulated.
+    pub fn exact_fit(&self, hypothesis: &Hypothesis, start: &Parameters, scope: Scope) -> Option<Fitted> {
+        let slopes = self.slopes_at(start, &self.data.residuals(start)?);
+        self.fit(hypothesis, start, scope, &slopes, EXACT)
+    }
+
+    fn fit(
+        &self,
+        hypothesis: &Hypothesis,
+        start: &Parameters,
+        scope: Scope,
+        slopes: &[Vec<f64>],
+        effort: Effort,
+    ) -> Option<Fitted> {
         let (variables, free) = self.everything_free(hypothesis, start);
         let weights = self.data.weights(scope);
         let residuals = |values: &[f64]| {
             Some(weighted(&self.data.residuals(&with_values(self.nominal, &variables, values))?, &weights))
         };
-        let fit = least_squares::fit(&residuals, &free, &[], ITERATIONS.1);
+        let known: Vec<Vec<f64>> = slopes.iter().map(|slope| weighted(slope, &weights)).collect();
+        let fit = least_squares::fit(&residuals, &free, &known, effort);
         if fit.ended == Ended::NoStart {
             return None;
         }
@@ -180,34 +201,16 @@ impl<'a> Bench<'a> {
         Some(self.fitted(hypothesis, parameters, self.data.residuals(&parameters)?))
     }
 
-    /// Fits a hypothesis on all samples, with the corrections to first order: one simulation per parameter of the effects.
-    ///
-    /// `None` where the start cannot be simulated.
-    pub fn quick_fit(&self, hypothesis: &Hypothesis, start: &Parameters) -> Option<Fitted> {
-        let variables = hypothesis.variables();
-        let free = bounds(&variables, start);
-        let linear: Vec<Linear> = self
-            .corrections
-            .iter()
-            .zip(&self.slopes)
-            .map(|((variable, free), slope)| {
-                let origin = declared(start, variable.name).1;
-                let free = Free { start: origin, ..*free };
-                Linear { free, column: weighted(slope, &self.weights), origin }
-            })
-            .collect();
-        let residuals = |values: &[f64]| {
-            Some(weighted(&self.data.residuals(&with_values(start, &variables, values))?, &self.weights))
-        };
-        let fit = least_squares::fit(&residuals, &free, &linear, ITERATIONS.0);
-        if fit.ended == Ended::NoStart {
-            return None;
-        }
-        let all: Vec<_> =
-            variables.iter().chain(self.corrections.iter().map(|(variable, _)| variable)).copied().collect();
-        let parameters = with_values(start, &all, &fit.parameters);
-        let raw = fit.residuals.iter().zip(&self.weights).map(|(r, weight)| r / weight).collect();
-        Some(self.fitted(hypothesis, parameters, raw))
+    /// Change of the residuals per unit of each correction at a model.
+    fn slopes_at(&self, model: &Parameters, residuals: &[f64]) -> Vec<Vec<f64>> {
+        let (variables, free): (Vec<_>, Vec<_>) = self.corrections.iter().copied().unzip();
+        let at: Vec<f64> = variables.iter().map(|variable| declared(model, variable.name).1).collect();
+        derivatives(
+            &|values: &[f64]| self.data.residuals(&with_values(model, &variables, values)),
+            &free,
+            &at,
+            residuals,
+        )
     }
 
     fn fitted(&self, hypothesis: &Hypothesis, parameters: Parameters, residuals: Vec<f64>) -> Fitted {
@@ -247,14 +250,21 @@ impl<'a> Bench<'a> {
 
     /// Share of the squares that goes away when a change is scaled, up to five times, and the corrections adapt.
     fn promise(&self, residuals: &[f64], change: Vec<f64>) -> f64 {
-        let free = Free { start: 1.0, lower: 0.0, upper: 5.0, typical: 1.0, prior: None };
-        let mut linear = vec![Linear { free: Free { start: 0.0, ..free }, column: change, origin: 0.0 }];
-        linear.extend(self.corrections.iter().zip(&self.slopes).map(|((_, free), slope)| {
-            let size = free.typical;
-            let free = Free { start: 0.0, lower: -2.0 * size, upper: 2.0 * size, prior: None, ..*free };
-            Linear { free, column: weighted(slope, &self.weights), origin: 0.0 }
-        }));
-        let fit = least_squares::fit(&|_: &[f64]| Some(residuals.to_vec()), &[], &linear, 6);
+        let scale = Free { start: 0.0, lower: 0.0, upper: 5.0, typical: 1.0, prior: None };
+        let (mut free, mut columns) = (vec![scale], vec![change]);
+        for ((_, correction), slope) in self.corrections.iter().zip(&self.slopes) {
+            let size = 2.0 * correction.typical;
+            free.push(Free { start: 0.0, lower: -size, upper: size, prior: None, ..*correction });
+            columns.push(weighted(slope, &self.weights));
+        }
+        let changed = |values: &[f64]| {
+            let mut changed = residuals.to_vec();
+            for (value, column) in values.iter().zip(&columns) {
+                changed.iter_mut().zip(column).for_each(|(r, slope)| *r += value * slope);
+            }
+            Some(changed)
+        };
+        let fit = least_squares::fit(&changed, &free, &columns, ROUGH);
         1.0 - fit.cost / residuals.iter().map(|r| r * r).sum::<f64>()
     }
 

@@ -204,6 +204,26 @@ impl<'a> Data<'a> {
             .collect()
     }
 
+    /// Residuals of a signal one by one: recording, position within it, residual in SI, and whether fits may see it.
+    pub fn each<'s>(
+        &'s self,
+        signal: Signal,
+        residuals: &'s [f64],
+    ) -> impl Iterator<Item = (usize, usize, f64, bool)> + 's {
+        self.segments.iter().filter(move |segment| segment.signal == signal).flat_map(move |segment| {
+            segment
+                .samples
+                .iter()
+                .zip(&residuals[segment.range.clone()])
+                .map(move |(&k, residual)| (segment.recording, k, *residual, self.is_in(Scope::Training, segment, k)))
+        })
+    }
+
+    /// The recordings.
+    pub fn recordings(&self) -> &'a [Recording] {
+        self.recordings
+    }
+
     /// Per residual, the root of the variance that counts when many of them are added up: their size and how long they
     /// hang together.
     pub fn spread(&self, residuals: &[f64], scope: Scope) -> Vec<f64> {

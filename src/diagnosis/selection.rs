@@ -19,6 +19,9 @@ const LEAST_EXPLAINED: f64 = 0.7;
 const LEAST_FURTHER: f64 = 0.6;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
+/// Share of a signal's error that a named effect may leave without a further effect being looked for: a tenth of its rms
+/// is how the form of an effect differs from the true one.
+const LEFT_BY_FORM: f64 = 0.01;
 /// Structural error of a nominal muscle beyond its coefficients, as a share of the declared tolerance and of the span of
 /// the signal. It only keeps a small error from being called unexplained.
 const STRUCTURE_SHARE: f64 = 0.2;
@@ -180,16 +183,22 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn best_fit(&self, base: &Fitted, starts: &[(f64, Part, Parameters)]) -> Option<Judged> {
         let fits = starts.iter().take(STARTS).filter_map(|(_, part, start)| {
-            Some(self.judge(self.bench.quick_fit(&base.hypothesis.with(*part), start)?))
+            Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(*part), start)?))
         });
         fits.max_by(|a, b| a.evidence.total_cmp(&b.evidence))
     }
 
-    /// The same, the best of them with their last effect refined.
+    /// The same, the best of them with their last effect refined and fitted to the end: what a fit left undone would
+    /// else be credited to the next effect.
     fn refined_best(&self, mut judged: Vec<Judged>) -> Vec<Judged> {
         let rest = judged.split_off(BEAM.min(judged.len()));
-        let refined = judged.into_par_iter().map(|judged| self.refined(judged));
+        let refined = judged.into_par_iter().map(|judged| self.finished(self.refined(judged)));
         sorted(refined.chain(rest).collect())
+    }
+
+    fn finished(&self, judged: Judged) -> Judged {
+        let Fitted { hypothesis, parameters, .. } = &judged.fitted;
+        self.bench.exact_fit(hypothesis, parameters, Scope::All).map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
     /// The hypothesis with the refinements of its last effect free, where the data pay for them.
@@ -203,7 +212,7 @@ impl<'a, 'b> Search<'a, 'b> {
         for (name, values) in last.effect.refinements {
             let _ = start.set(name, values[0]);
         }
-        match self.bench.quick_fit(&hypothesis, &start).map(|fitted| self.judge(fitted)) {
+        match self.bench.rough_fit(&hypothesis, &start).map(|fitted| self.judge(fitted)) {
             Some(better) if better.evidence > judged.evidence => better,
             _ => judged,
         }
@@ -211,10 +220,10 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Whether the best of the hypotheses leaves an error that is worth a further effect.
     fn something_is_left(&self, level: &[Judged]) -> bool {
-        level.first().is_some_and(|best| {
-            best.evidence > LEAST_EVIDENCE
-                && beyond_noise(&best.fitted.losses).values().any(|beyond| *beyond > NEGLIGIBLE)
-        })
+        let Some(best) = level.first().filter(|best| best.evidence > LEAST_EVIDENCE) else { return false };
+        let before = beyond_noise(&self.baseline.losses);
+        let after = beyond_noise(&best.fitted.losses);
+        after.iter().any(|(signal, left)| *left > NEGLIGIBLE && *left > LEFT_BY_FORM * before[signal])
     }
 
     fn next_level(&self, level: &[Judged]) -> Vec<Judged> {
@@ -266,7 +275,7 @@ impl<'a, 'b> Search<'a, 'b> {
     fn choose(self, levels: Vec<Vec<Judged>>) -> Option<Chosen> {
         let singles = levels[0].clone();
         let refused = |verdict| {
-            let model = self.bench.fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
+            let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
             Some(Chosen { verdict, model, alternatives: Vec::new(), singles: singles.clone() })
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
@@ -285,14 +294,14 @@ impl<'a, 'b> Search<'a, 'b> {
         } else {
             Verdict::PartlyExplained
         };
-        let model = self.bench.fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
+        let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
         Some(Chosen { verdict, model, alternatives, singles })
     }
 
     /// Whether a hypothesis, fitted to the samples that fits may see, does better on those that they may not.
     fn holds(&self, fitted: &Fitted) -> Option<bool> {
         let on_unseen = |fitted: &Fitted| {
-            let trained = self.bench.fit(&fitted.hypothesis, &fitted.parameters, Scope::Training)?;
+            let trained = self.bench.exact_fit(&fitted.hypothesis, &fitted.parameters, Scope::Training)?;
             Some(self.bench.data.losses(&trained.residuals, Scope::HeldOut))
         };
         let (without, with) = (on_unseen(&self.baseline)?, on_unseen(fitted)?);
