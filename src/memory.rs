@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-/// Instants that are closer than this, in s, count as the same: far below any step, far above rounding.
+/// Instants that are closer than this, in s, count as the same: far below any step.
 const SAME_INSTANT: f64 = 1e-12;
 /// Steps of a sticking pilot that follow each other faster than this, in s, are replaced by the line through their
 /// middles: the muscle is slower by orders of magnitude.
@@ -232,7 +232,8 @@ impl Pilot {
 
 /// Play: the position moves only where the line pushes it.
 fn follow_with_play(position: &mut f64, half_width: f64, line: Line, mut tell: impl FnMut(Line)) {
-    *position = position.clamp(line.value - half_width, line.value + half_width);
+    // Not `clamp`, which panics where a derivative tries a width below zero.
+    *position = position.max(line.value - half_width).min(line.value + half_width);
     let direction = if line.slope < 0.0 { -1.0 } else { 1.0 };
     // Until the pushing flank has come to the position.
     let gap = direction * (*position - line.value) + half_width;

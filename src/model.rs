@@ -444,7 +444,8 @@ impl<S: System> Simulator<S> {
                 }
             };
             passed.map_err(|failed| diverged::<S>(time + after, &failed))?;
-            after = if span < duration - after { after + span } else { duration };
+            // On, even where a passage is shorter than rounding.
+            after = if span < duration - after { (after + span).max(after.next_up()) } else { duration };
         }
         match S::left_range(parameters, &state) {
             Some(variable) => Err(Error::Diverged { time: time + duration, variable }),

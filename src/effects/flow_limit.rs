@@ -84,7 +84,7 @@ impl Effect for FlowLimit {
         let excess = (rate / most).abs();
         // Below 1 % roundness nobody could tell the curve from the corner.
         if self.roundness < 0.01 {
-            return rate.clamp(-most, most);
+            return rate.max(-most).min(most);
         }
         if self.roundness == 0.5 {
             return rate / (1.0 + excess * excess).sqrt();

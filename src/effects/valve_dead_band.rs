@@ -61,7 +61,8 @@ impl Effect for ValveDeadBand {
             return target;
         }
         let overlap = self.pressure_overlap;
-        target - (target - at.gauge_pressure).clamp(-overlap, overlap)
+        // Not `clamp`, which panics where a derivative tries an overlap below zero.
+        target - (target - at.gauge_pressure).max(-overlap).min(overlap)
     }
 
     fn sentence(&self) -> String {
