@@ -146,6 +146,7 @@ impl System for PidFeedForward {
     type Inputs = ControllerInputs;
     type Outputs = ControllerOutputs;
     type State = ControllerState;
+    type Memory = ();
     const SCALE: ControllerState = [1.0, 0.1];
 
     fn initial_state(parameters: &Parameters, inputs: &ControllerInputs) -> Result<ControllerState> {
@@ -170,6 +171,7 @@ impl System for PidFeedForward {
         _: f64,
         inputs: &ControllerInputs,
         state: &ControllerState,
+        (): &(),
     ) -> ControllerOutputs {
         let Parameters { controller, .. } = parameters;
         let command = unlimited_command(parameters, inputs, state);

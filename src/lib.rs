@@ -1,7 +1,7 @@
 //! Pneumatic artificial muscles as FMUs that learn from measurements.
 //!
 //! In the order data flows: [`variables`] declares what there is; [`muscle`], [`valve`], [`load`] and [`effects`] are the
-//! physics; [`plant`], [`controller`] and [`mod@reference`] put it together; [`model`] steps it and [`mod@model_description`] describes
+//! physics, [`memory`] what they remember; [`plant`], [`controller`] and [`mod@reference`] put it together; [`model`] steps it and [`mod@model_description`] describes
 //! it; [`models`] lists them. With the feature `tool`, [`package`] makes FMUs and [`mod@export`] writes them, [`measurement`] reads recordings, [`simulation`] replays them and
 //! [`diagnosis`] says what the model gets wrong.
 
@@ -12,6 +12,7 @@ pub mod controller;
 pub mod effects;
 pub mod integrator;
 pub mod load;
+pub mod memory;
 pub mod model;
 pub mod model_description;
 pub mod models;

@@ -4,6 +4,7 @@
 
 use crate::effects::{Description, Effects};
 use crate::integrator;
+use crate::memory::Memory;
 use crate::muscle::ForceModels;
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Signals, Variable};
@@ -23,7 +24,7 @@ pub struct Documentation {
     pub source: &'static str,
 }
 
-/// State of a system: an array of reals.
+/// State of a system: an array of reals, first its own and then those of effects.
 pub trait State: Copy + Send {
     /// All zero.
     const ZERO: Self;
@@ -38,10 +39,26 @@ pub trait State: Copy + Send {
     fn advance(
         &mut self,
         rates: impl Fn(f64, &Self, &mut Self),
+        witness: impl FnMut(f64, &Self, f64, &Self),
         scale: &Self,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed>;
+    /// As [`State::advance`], while the states of effects rest.
+    ///
+    /// # Errors
+    /// As [`integrator::advance`].
+    #[inline]
+    fn advance_own(
+        &mut self,
+        rates: impl Fn(f64, &Self, &mut Self),
+        witness: impl FnMut(f64, &Self, f64, &Self),
+        scale: &Self,
+        step: &mut f64,
+        duration: f64,
+    ) -> std::result::Result<(), integrator::Failed> {
+        self.advance(rates, witness, scale, step, duration)
+    }
 }
 
 impl<const N: usize> State for [f64; N] {
@@ -56,6 +73,7 @@ impl<const N: usize> State for [f64; N] {
     fn advance(
         &mut self,
         rates: impl Fn(f64, &Self, &mut Self),
+        witness: impl FnMut(f64, &Self, f64, &Self),
         scale: &Self,
         step: &mut f64,
         duration: f64,
@@ -63,9 +81,87 @@ impl<const N: usize> State for [f64; N] {
         if N == 0 {
             return Ok(());
         }
-        integrator::advance(rates, scale, self, step, duration)
+        integrator::advance(rates, witness, scale, self, step, duration)
     }
 }
+
+/// `N` states of which the first `OWN` are those of the system itself, and the others those of effects.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extended<const OWN: usize, const N: usize>(pub [f64; N]);
+
+impl<const OWN: usize, const N: usize> Extended<OWN, N> {
+    fn own(&self) -> [f64; OWN] {
+        std::array::from_fn(|k| self.0[k])
+    }
+
+    fn with_own(mut self, own: &[f64; OWN]) -> Self {
+        self.0[..OWN].copy_from_slice(own);
+        self
+    }
+}
+
+impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
+    const ZERO: Self = Self([0.0; N]);
+    fn as_slice(&self) -> &[f64] {
+        &self.0
+    }
+    fn as_mut_slice(&mut self) -> &mut [f64] {
+        &mut self.0
+    }
+    #[inline]
+    fn advance(
+        &mut self,
+        rates: impl Fn(f64, &Self, &mut Self),
+        mut witness: impl FnMut(f64, &Self, f64, &Self),
+        scale: &Self,
+        step: &mut f64,
+        duration: f64,
+    ) -> std::result::Result<(), integrator::Failed> {
+        let rates = |t: f64, state: &[f64; N], out: &mut [f64; N]| {
+            let mut all = Self::ZERO;
+            rates(t, &Self(*state), &mut all);
+            *out = all.0;
+        };
+        let witness = |t0: f64, y0: &[f64; N], t1: f64, y1: &[f64; N]| witness(t0, &Self(*y0), t1, &Self(*y1));
+        self.0.advance(rates, witness, &scale.0, step, duration)
+    }
+    #[inline]
+    fn advance_own(
+        &mut self,
+        rates: impl Fn(f64, &Self, &mut Self),
+        mut witness: impl FnMut(f64, &Self, f64, &Self),
+        scale: &Self,
+        step: &mut f64,
+        duration: f64,
+    ) -> std::result::Result<(), integrator::Failed> {
+        let (resting, mut own) = (*self, self.own());
+        let rates = |t: f64, own: &[f64; OWN], out: &mut [f64; OWN]| {
+            let mut all = Self::ZERO;
+            rates(t, &resting.with_own(own), &mut all);
+            *out = all.own();
+        };
+        let witness = |t0: f64, y0: &[f64; OWN], t1: f64, y1: &[f64; OWN]| {
+            witness(t0, &resting.with_own(y0), t1, &resting.with_own(y1));
+        };
+        own.advance(rates, witness, &scale.own(), step, duration)?;
+        *self = resting.with_own(&own);
+        Ok(())
+    }
+}
+
+/// What of a system is at work besides its own equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// Nothing: the nominal equations hold.
+    Nominal,
+    /// Effects without states.
+    Stateless,
+    /// Effects with states.
+    Full,
+}
+
+/// Inputs as the equations feel them over a passage: at its start, their slopes, and how long it lasts in s.
+pub type Passage<Inputs> = (Inputs, Inputs, f64);
 
 /// The equations of a model.
 pub trait System: Copy + Send + 'static {
@@ -93,6 +189,8 @@ pub trait System: Copy + Send + 'static {
     type Outputs: Signals;
     /// State.
     type State: State;
+    /// What it remembers beyond its state.
+    type Memory: Memory;
     /// Usual size of each state.
     const SCALE: Self::State;
 
@@ -104,9 +202,53 @@ pub trait System: Copy + Send + 'static {
     /// Derivatives of the state, per second.
     fn rates(parameters: &Parameters, inputs: &Self::Inputs, state: &Self::State, rates: &mut Self::State);
     /// Outputs at a time in s.
-    fn outputs(parameters: &Parameters, time: f64, inputs: &Self::Inputs, state: &Self::State) -> Self::Outputs;
+    fn outputs(
+        parameters: &Parameters,
+        time: f64,
+        inputs: &Self::Inputs,
+        state: &Self::State,
+        memory: &Self::Memory,
+    ) -> Self::Outputs;
     /// Name of a state that has left the range in which the model means anything.
     fn left_range(parameters: &Parameters, state: &Self::State) -> Option<&'static str>;
+
+    /// What is at work.
+    fn extent(_parameters: &Parameters) -> Extent {
+        Extent::Nominal
+    }
+    /// As [`System::rates`] where the extent is nominal.
+    #[inline]
+    fn nominal_rates(parameters: &Parameters, inputs: &Self::Inputs, state: &Self::State, rates: &mut Self::State) {
+        Self::rates(parameters, inputs, state, rates);
+    }
+    /// Takes note of the step that is to come; nothing is remembered where the extent is nominal.
+    fn expect(_memory: &mut Self::Memory, _step: &Step<'_, Self>) {}
+    /// The inputs as they are felt from `after` seconds into a step on.
+    #[inline]
+    fn felt(_memory: &Self::Memory, step: &Step<'_, Self>, after: f64) -> Passage<Self::Inputs> {
+        (step.inputs.along(&step.slopes, after), step.slopes, step.duration - after)
+    }
+    /// Takes note of what the state has become between two times in s.
+    fn witness(_memory: &mut Self::Memory, _parameters: &Parameters, _times: [f64; 2], _states: [&Self::State; 2]) {}
+    /// Forgets what does not matter from a time in s on.
+    fn forget(_memory: &mut Self::Memory, _parameters: &Parameters, _time: f64) {}
+}
+
+/// A communication step.
+#[derive(Debug, Clone, Copy)]
+pub struct Step<'a, S: System + ?Sized> {
+    /// Parameters.
+    pub parameters: &'a Parameters,
+    /// Time at its start, s.
+    pub time: f64,
+    /// State at its start.
+    pub state: S::State,
+    /// Inputs at its start.
+    pub inputs: S::Inputs,
+    /// Derivatives of the inputs, per second.
+    pub slopes: S::Inputs,
+    /// How long it lasts, s.
+    pub duration: f64,
 }
 
 /// A variable of a model: its declaration and the name it has there.
@@ -196,6 +338,7 @@ pub struct Simulator<S: System> {
     time: f64,
     state: S::State,
     step: f64,
+    memory: S::Memory,
 }
 
 /// Step that an integration tries first, s.
@@ -205,7 +348,8 @@ impl<S: System> Simulator<S> {
     /// A simulation that is yet to be initialised.
     pub fn new(parameters: Parameters) -> Self {
         let (inputs, slopes) = (S::Inputs::default(), S::Inputs::default());
-        Self { parameters, inputs, slopes, time: 0.0, state: S::State::ZERO, step: FIRST_STEP }
+        let memory = S::Memory::default();
+        Self { parameters, inputs, slopes, time: 0.0, state: S::State::ZERO, step: FIRST_STEP, memory }
     }
 
     /// Time in s.
@@ -230,12 +374,21 @@ impl<S: System> Simulator<S> {
         self.state = state;
         self.time = time;
         self.step = FIRST_STEP;
+        let mut memory = S::Memory::default();
+        S::expect(&mut memory, &self.coming(0.0));
+        self.memory = memory;
         Ok(())
     }
 
     /// Outputs at the present time.
     pub fn outputs(&self) -> S::Outputs {
-        S::outputs(&self.parameters, self.time, &self.inputs, &self.state)
+        S::outputs(&self.parameters, self.time, &self.inputs, &self.state, &self.memory)
+    }
+
+    /// The step that is to come.
+    fn coming(&self, duration: f64) -> Step<'_, S> {
+        let Self { ref parameters, inputs, slopes, time, state, .. } = *self;
+        Step { parameters, time, state, inputs, slopes, duration }
     }
 
     /// Advances by a duration in s; the inputs move along their slopes, which are then zero.
@@ -243,40 +396,84 @@ impl<S: System> Simulator<S> {
     /// # Errors
     /// [`Error::Diverged`], [`Error::TooManySteps`]; nothing has changed then.
     pub fn advance(&mut self, duration: f64) -> Result<()> {
-        let (mut state, mut step) = (self.state, self.step);
-        let (parameters, inputs, slopes) = (&self.parameters, &self.inputs, &self.slopes);
-        let rates = |after: f64, state: &S::State, rates: &mut S::State| {
-            S::rates(parameters, &inputs.along(slopes, after), state, rates);
-        };
-        state.advance(rates, &S::SCALE, &mut step, duration).map_err(|failed| {
-            let time = self.time + failed.after;
-            match failed.state {
-                Some(state) => {
-                    let variable = S::STATE_NAMES.get(state).copied().unwrap_or("state of an effect");
-                    Error::Diverged { time, variable }
-                }
-                None => Error::TooManySteps { time },
+        let mark = self.memory.mark(self.time);
+        let (state, step) = match self.integrate(duration) {
+            Ok(arrived) => arrived,
+            Err(error) => {
+                self.memory.roll_back(mark);
+                return Err(error);
             }
-        })?;
-        if let Some(variable) = S::left_range(parameters, &state) {
-            return Err(Error::Diverged { time: self.time + duration, variable });
-        }
-        self.inputs = inputs.along(slopes, duration);
+        };
+        self.inputs = self.inputs.along(&self.slopes, duration);
         self.slopes = S::Inputs::default();
         (self.state, self.step) = (state, step);
         self.time += duration;
+        S::forget(&mut self.memory, &self.parameters, self.time);
         Ok(())
+    }
+
+    /// State and proposed step after a duration in s. Of the simulator only its memory goes along.
+    fn integrate(&mut self, duration: f64) -> Result<(S::State, f64)> {
+        let Self { ref parameters, inputs, slopes, time, mut state, mut step, ref mut memory } = *self;
+        let coming = Step { parameters, time, state, inputs, slopes, duration };
+        let extent = S::extent(parameters);
+        S::expect(memory, &coming);
+        let mut after = 0.0;
+        while after < duration {
+            let (felt, slopes, span) = S::felt(memory, &coming, after);
+            let passed = match extent {
+                Extent::Nominal => {
+                    let rates = |t: f64, y: &S::State, dy: &mut S::State| {
+                        S::nominal_rates(parameters, &felt.along(&slopes, t), y, dy);
+                    };
+                    state.advance_own(rates, |_, _, _, _| {}, &S::SCALE, &mut step, span)
+                }
+                Extent::Stateless | Extent::Full => {
+                    let rates = |t: f64, y: &S::State, dy: &mut S::State| {
+                        S::rates(parameters, &felt.along(&slopes, t), y, dy);
+                    };
+                    let start = time + after;
+                    let witness = |t0: f64, y0: &S::State, t1: f64, y1: &S::State| {
+                        S::witness(memory, parameters, [start + t0, start + t1], [y0, y1]);
+                    };
+                    if extent == Extent::Full {
+                        state.advance(rates, witness, &S::SCALE, &mut step, span)
+                    } else {
+                        state.advance_own(rates, witness, &S::SCALE, &mut step, span)
+                    }
+                }
+            };
+            passed.map_err(|failed| diverged::<S>(time + after, &failed))?;
+            // On, even where a passage is shorter than rounding.
+            after = if span < duration - after { (after + span).max(after.next_up()) } else { duration };
+        }
+        match S::left_range(parameters, &state) {
+            Some(variable) => Err(Error::Diverged { time: time + duration, variable }),
+            None => Ok((state, step)),
+        }
     }
 
     /// Outputs `span` seconds from now, to first order.
     fn outputs_near(&self, span: f64) -> S::Outputs {
-        let mut rates = S::State::ZERO;
-        S::rates(&self.parameters, &self.inputs, &self.state, &mut rates);
+        let (mut rates, mut memory, coming) = (S::State::ZERO, self.memory.clone(), self.coming(span.abs()));
+        S::expect(&mut memory, &coming);
+        let (felt, ..) = S::felt(&memory, &coming, 0.0);
+        S::rates(&self.parameters, &felt, &self.state, &mut rates);
         let mut state = self.state;
         for (value, rate) in state.as_mut_slice().iter_mut().zip(rates.as_slice()) {
             *value += rate * span;
         }
-        S::outputs(&self.parameters, self.time + span, &self.inputs.along(&self.slopes, span), &state)
+        S::outputs(&self.parameters, self.time + span, &self.inputs.along(&self.slopes, span), &state, &self.memory)
+    }
+}
+
+fn diverged<S: System>(start: f64, failed: &integrator::Failed) -> Error {
+    let time = start + failed.after;
+    match failed.state {
+        Some(state) => {
+            Error::Diverged { time, variable: S::STATE_NAMES.get(state).copied().unwrap_or("state of an effect") }
+        }
+        None => Error::TooManySteps { time },
     }
 }
 
@@ -350,6 +547,9 @@ impl<S: Registered> Model for Simulator<S> {
     }
 
     fn set_time(&mut self, time: f64) {
+        if time != self.time {
+            self.memory.shift(time - self.time);
+        }
         self.time = time;
     }
 
@@ -418,18 +618,23 @@ impl<S: Registered> Model for Simulator<S> {
             signals.visit(&mut |_, value| saved.push(value));
         }
         self.parameters.visit(&mut |_, value| saved.push(value));
+        self.memory.save(&mut saved);
         saved
     }
 
     fn restore(&mut self, saved: &[f64]) -> Result<()> {
         let wrong = |problem| Error::SavedState { problem };
-        if saved.len() != self.save().len() {
-            return Err(wrong("it is of another model or version"));
-        }
-        if saved.iter().any(|value| !value.is_finite()) || saved[1] <= 0.0 {
+        let foreign = || wrong("it is of another model or version");
+        let mut restored = Self::new(self.parameters);
+        // All but the memory has a fixed length.
+        let mut memory_of_none = Vec::new();
+        restored.memory.save(&mut memory_of_none);
+        let fixed = restored.save().len() - memory_of_none.len();
+        let (saved, memory) = saved.split_at_checked(fixed).ok_or_else(foreign)?;
+        if saved.iter().chain(memory).any(|value| !value.is_finite()) || saved[1] <= 0.0 {
             return Err(wrong("it holds values that no simulation has"));
         }
-        let mut restored = self.clone();
+        restored.memory = S::Memory::load(memory).ok_or_else(foreign)?;
         let mut rest = saved.iter().copied();
         let mut take = || rest.next().unwrap_or_default();
         (restored.time, restored.step) = (take(), take());

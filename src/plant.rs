@@ -1,8 +1,10 @@
 //! Valve, muscle and load put together, with every effect in its place.
 
 use crate::effects::{Effects, Point, Readings};
-use crate::model::{Documentation, Feedthrough, System};
+use crate::memory::{Line, PlantMemory};
+use crate::model::{Documentation, Extended, Extent, Feedthrough, Passage, Step, System};
 use crate::parameters::Parameters;
+use crate::variables::Signals;
 use crate::{Error, GRAVITY, Result};
 
 /// States of the plant: pressure, contraction, its velocity, and those of the effects.
@@ -77,23 +79,89 @@ crate::variables::signals! {
     }
 }
 
+/// What is at work of the effects.
+#[inline]
+fn extent(parameters: &Parameters) -> Extent {
+    let effects = &parameters.effects;
+    match (effects.are_neutral(), effects.are_stateless()) {
+        (true, _) => Extent::Nominal,
+        (false, true) => Extent::Stateless,
+        (false, false) => Extent::Full,
+    }
+}
+
 /// Pull of the muscle in N, with damping and effects; `own` are the states of the effects.
 #[inline]
-fn muscle_force(parameters: &Parameters, at: &Point, contraction: f64, own: &[f64]) -> f64 {
+fn muscle_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
     let Parameters { muscle, force_models, effects, .. } = parameters;
-    let static_force = force_models.force(muscle, at.gauge_pressure, contraction);
+    let pressure = effects.effective_pressure(at, at.gauge_pressure);
+    let contraction = effects.effective_contraction(at, own, at.contraction);
+    let of_area = effects.area_force(at, own, pressure * force_models.virtual_area(muscle, contraction));
+    let elastic = effects.elastic_force(at, own, force_models.elastic_force(muscle, contraction));
+    let static_force = effects.static_force(of_area + elastic);
     effects.muscle_force(at, own, static_force - muscle.damping * at.contraction_velocity)
+}
+
+/// Pull of the muscle in N without effects.
+#[inline]
+fn nominal_force(parameters: &Parameters, at: &Point) -> f64 {
+    let Parameters { muscle, force_models, .. } = parameters;
+    force_models.force(muscle, at.gauge_pressure, at.contraction) - muscle.damping * at.contraction_velocity
+}
+
+/// Gauge pressure in Pa that a command in V asks for.
+#[inline]
+fn commanded_pressure(parameters: &Parameters, command: f64) -> f64 {
+    parameters.valve.target_pressure(parameters.effects.command(command))
+}
+
+/// The point with the pressure that the valve goes for.
+#[inline]
+fn with_target(parameters: &Parameters, command: f64, at: Point, own: &[f64]) -> Point {
+    let commanded_pressure = commanded_pressure(parameters, command);
+    let at = Point { commanded_pressure, ..at };
+    Point { target_pressure: parameters.effects.target_pressure(&at, own, commanded_pressure), ..at }
 }
 
 /// Rate of the gauge pressure in Pa/s.
 #[inline]
-fn pressure_rate(parameters: &Parameters, command: f64, gauge_pressure: f64) -> f64 {
-    let bandwidth = parameters.effects.valve_bandwidth(parameters.valve.bandwidth);
-    bandwidth * (parameters.valve.target_pressure(command) - gauge_pressure)
+fn pressure_rate(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
+    let effects = &parameters.effects;
+    let bandwidth = effects.valve_bandwidth(at, parameters.valve.bandwidth);
+    effects.pressure_rate(at, own, bandwidth * (at.target_pressure - at.gauge_pressure))
 }
 
+/// As [`pressure_rate`], without effects.
+#[inline]
+fn nominal_pressure_rate(parameters: &Parameters, command: f64, gauge_pressure: f64) -> f64 {
+    parameters.valve.bandwidth * (parameters.valve.target_pressure(command) - gauge_pressure)
+}
+
+/// Mass in kg that moves.
 fn moving_mass(parameters: &Parameters) -> f64 {
     parameters.effects.mass(parameters.load.mass)
+}
+
+/// Point of a muscle at rest, its valve asking for the pressure that is there.
+fn at_rest(gauge_pressure: f64, contraction: f64) -> Point {
+    let (commanded_pressure, target_pressure) = (gauge_pressure, gauge_pressure);
+    Point { commanded_pressure, target_pressure, gauge_pressure, contraction, contraction_velocity: 0.0 }
+}
+
+/// Gauge pressure in Pa at which the valve comes to rest under a command in V, with a contraction in m.
+///
+/// A valve that rings comes to rest where one of first order does.
+pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) -> f64 {
+    let mut still = *parameters;
+    still.effects.valve_resonance = Default::default();
+    still.effects.valve_lag.second_time_constant = 0.0;
+    let own = [0.0; Effects::STATES];
+    let rate = |pressure: f64| {
+        let at = with_target(&still, command, at_rest(pressure, contraction), &own);
+        pressure_rate(&still, &at, &own)
+    };
+    let highest = 1e5 + commanded_pressure(&still, command);
+    if rate(0.0) <= 0.0 { 0.0 } else { bisect(rate, 0.0, highest) }
 }
 
 /// Gauge pressure in Pa at which a weight in N hangs still at a contraction in m.
@@ -102,13 +170,30 @@ pub fn holding_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
     (weight - force_models.elastic_force(muscle, contraction)) / force_models.virtual_area(muscle, contraction)
 }
 
-/// Contraction in m at which the muscle holds a weight in N at a gauge pressure in Pa, at rest; `None` where there is
-/// none.
+/// As [`holding_pressure`], with the effects as they are at the start; never below ambient.
+pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) -> f64 {
+    let nominal = holding_pressure(parameters, contraction, weight).max(0.0);
+    if parameters.effects.are_neutral() {
+        return nominal;
+    }
+    let lack = |gauge_pressure: f64| {
+        let at = at_rest(gauge_pressure, contraction);
+        weight - muscle_force(parameters, &at, &parameters.effects.start(&at))
+    };
+    let highest = 2.0 * nominal + 5e5;
+    if lack(0.0) <= 0.0 || lack(highest) > 0.0 { nominal } else { bisect(lack, 0.0, highest) }
+}
+
+/// Contraction in m at which the muscle holds a weight in N at a gauge pressure in Pa, at rest, with the effects as they
+/// are at the start; `None` where there is none.
 ///
 /// Among several it is the longest muscle whose stiffness is positive.
 pub fn equilibrium(parameters: &Parameters, gauge_pressure: f64, weight: f64) -> Option<f64> {
-    let Parameters { muscle, force_models, .. } = parameters;
-    let surplus = |contraction: f64| force_models.force(muscle, gauge_pressure, contraction) - weight;
+    let muscle = &parameters.muscle;
+    let surplus = |contraction: f64| {
+        let at = at_rest(gauge_pressure, contraction);
+        muscle_force(parameters, &at, &parameters.effects.start(&at)) - weight
+    };
     let samples = 300;
     let at = |k: i32| muscle.rest_length * (-0.2 + 0.7 * f64::from(k) / f64::from(samples));
     let bracket = (0..samples).find(|&k| surplus(at(k)) > 0.0 && surplus(at(k + 1)) <= 0.0)?;
@@ -133,8 +218,8 @@ fn bisect(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 /// Muscle, valve and a load that hangs from it.
 ///
 /// # Model
-/// dp/dt = ω (K_v u − p); F = p A(x) + F_e(x) − B v; M dv/dt = F − M g − F_ext; the effects act on ω, F, M and on what
-/// the sensors show.
+/// dp/dt = ω (K_v u − p); F = p A(x) + F_e(x) − B v; M dv/dt = F − M g − F_ext; the effects act on u, ω, dp/dt, on what
+/// the muscle feels of p and x, on both parts of F, on M, and on what the sensors show.
 ///
 /// # Reference
 /// Thesis eqs. 4.5, 5.3, 5.4.
@@ -163,45 +248,55 @@ impl System for PneumaticMuscle {
         &["muscle.gauge_pressure", "muscle.contraction", "muscle.contraction_velocity"];
     type Inputs = MuscleInputs;
     type Outputs = MuscleOutputs;
-    type State = [f64; HANGING_STATES];
-    const SCALE: Self::State = {
-        let mut scale = [1.0; HANGING_STATES];
-        (scale[0], scale[1], scale[2]) = (1e5, 0.1, 0.1);
-        scale
-    };
+    type State = Extended<3, HANGING_STATES>;
+    type Memory = PlantMemory;
+    const SCALE: Self::State = Extended(Effects::scales(&[1e5, 0.1, 0.1]));
 
     fn initial_state(parameters: &Parameters, inputs: &MuscleInputs) -> Result<Self::State> {
         let (mass, gauge_pressure) = (moving_mass(parameters), parameters.initial.gauge_pressure);
         let hanging = equilibrium(parameters, gauge_pressure, mass * GRAVITY + inputs.external_force);
+        let contraction = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
         let mut state = [0.0; HANGING_STATES];
-        state[0] = gauge_pressure;
-        state[1] = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
-        Ok(state)
+        state[..2].copy_from_slice(&[gauge_pressure, contraction]);
+        state[3..].copy_from_slice(&parameters.effects.start(&at_rest(gauge_pressure, contraction)));
+        Ok(Extended(state))
     }
 
     #[inline]
     fn rates(parameters: &Parameters, inputs: &MuscleInputs, state: &Self::State, rates: &mut Self::State) {
-        let [gauge_pressure, contraction, contraction_velocity, own @ ..] = state;
-        let at = Point { gauge_pressure: *gauge_pressure, contraction_velocity: *contraction_velocity };
-        let mass = moving_mass(parameters);
-        let force = muscle_force(parameters, &at, *contraction, own);
-        rates[0] = pressure_rate(parameters, inputs.command, *gauge_pressure);
-        rates[1] = *contraction_velocity;
-        rates[2] = (force - inputs.external_force) / mass - GRAVITY;
-        parameters.effects.rates(&at, own, &mut rates[3..]);
+        let (at, own) = hanging_point(state);
+        let at = with_target(parameters, inputs.command, at, own);
+        let force = muscle_force(parameters, &at, own);
+        rates.0[0] = pressure_rate(parameters, &at, own);
+        rates.0[1] = at.contraction_velocity;
+        rates.0[2] = (force - inputs.external_force) / moving_mass(parameters) - GRAVITY;
+        parameters.effects.rates(&at, own, &mut rates.0[3..]);
     }
 
-    fn outputs(parameters: &Parameters, _: f64, _: &MuscleInputs, state: &Self::State) -> MuscleOutputs {
-        let [gauge_pressure, contraction, contraction_velocity, own @ ..] = *state;
-        let at = Point { gauge_pressure, contraction_velocity };
-        let force = muscle_force(parameters, &at, contraction, &own);
-        let shown = parameters.effects.readings(Readings { contraction, gauge_pressure, force });
+    #[inline]
+    fn nominal_rates(parameters: &Parameters, inputs: &MuscleInputs, state: &Self::State, rates: &mut Self::State) {
+        let (at, _) = hanging_point(state);
+        rates.0[0] = nominal_pressure_rate(parameters, inputs.command, at.gauge_pressure);
+        rates.0[1] = at.contraction_velocity;
+        rates.0[2] = (nominal_force(parameters, &at) - inputs.external_force) / parameters.load.mass - GRAVITY;
+    }
+
+    fn outputs(
+        parameters: &Parameters,
+        time: f64,
+        _: &MuscleInputs,
+        state: &Self::State,
+        memory: &PlantMemory,
+    ) -> MuscleOutputs {
+        let (at, own) = hanging_point(state);
+        let force = muscle_force(parameters, &at, own);
+        let shown = readings(parameters, time, &at, force, memory);
         MuscleOutputs {
-            contraction,
-            contraction_velocity,
-            gauge_pressure,
+            contraction: at.contraction,
+            contraction_velocity: at.contraction_velocity,
+            gauge_pressure: at.gauge_pressure,
             force,
-            diameter: parameters.muscle.diameter(contraction),
+            diameter: parameters.muscle.diameter(at.contraction),
             measured_contraction: shown.contraction,
             measured_gauge_pressure: shown.gauge_pressure,
             measured_force: shown.force,
@@ -210,10 +305,111 @@ impl System for PneumaticMuscle {
 
     fn left_range(parameters: &Parameters, state: &Self::State) -> Option<&'static str> {
         if moving_mass(parameters) <= 0.0 {
-            return Some("load.mass with payload_mass.additional_mass");
+            return Some("load.mass with payload_mass");
         }
-        let length = parameters.muscle.rest_length - state[1];
+        let length = parameters.muscle.rest_length - state.0[1];
         (!(0.0..=parameters.muscle.thread_length).contains(&length)).then_some("muscle.contraction")
+    }
+
+    #[inline]
+    fn extent(parameters: &Parameters) -> Extent {
+        extent(parameters)
+    }
+
+    #[inline]
+    fn expect(memory: &mut PlantMemory, step: &Step<'_, Self>) {
+        if nothing_to_remember(memory, step.parameters) {
+            return;
+        }
+        expect_command(memory, step, |inputs| inputs.command);
+        expect_contraction(memory, step, step.state.0[1]);
+    }
+
+    #[inline]
+    fn felt(memory: &PlantMemory, step: &Step<'_, Self>, after: f64) -> Passage<MuscleInputs> {
+        felt(memory, step, after, |inputs| &mut inputs.command)
+    }
+
+    fn witness(memory: &mut PlantMemory, _: &Parameters, times: [f64; 2], [before, now]: [&Self::State; 2]) {
+        if !memory.contraction().is_empty() {
+            memory.contraction().push_cubic(times, [before.0[1], now.0[1]], [before.0[2], now.0[2]]);
+        }
+    }
+
+    #[inline]
+    fn forget(memory: &mut PlantMemory, parameters: &Parameters, time: f64) {
+        forget(memory, parameters, time);
+    }
+}
+
+/// The hanging load at an instant, but for the command; and the states of the effects.
+#[inline]
+fn hanging_point(state: &Extended<3, HANGING_STATES>) -> (Point, &[f64]) {
+    let [gauge_pressure, contraction, contraction_velocity, own @ ..] = &state.0;
+    let mut at = at_rest(*gauge_pressure, *contraction);
+    at.contraction_velocity = *contraction_velocity;
+    (at, own)
+}
+
+/// What the sensors show.
+#[inline]
+fn readings(parameters: &Parameters, time: f64, at: &Point, force: f64, memory: &PlantMemory) -> Readings {
+    let effects = &parameters.effects;
+    let remembered = memory.contraction_at(time - effects.contraction_delay());
+    let contraction = remembered.unwrap_or(at.contraction);
+    effects.readings(Readings { contraction, gauge_pressure: at.gauge_pressure, force })
+}
+
+/// Whether the memory is empty and stays so. An effect that has become neutral is forgotten.
+#[inline]
+fn nothing_to_remember(memory: &mut PlantMemory, parameters: &Parameters) -> bool {
+    let nothing = parameters.effects.are_neutral();
+    if nothing && !memory.is_empty() {
+        *memory = PlantMemory::default();
+    }
+    nothing
+}
+
+/// Takes note of the command of a step.
+fn expect_command<S: System>(memory: &mut PlantMemory, step: &Step<'_, S>, command: impl Fn(&S::Inputs) -> f64) {
+    let (effects, value, slope) = (&step.parameters.effects, command(&step.inputs), command(&step.slopes));
+    let line = Line { start: step.time, span: step.duration, value, slope };
+    memory.expect_command(&effects.slack(), effects.command_delay(), line);
+}
+
+/// Begins to remember the contraction, in m now, where its sensor is late, and ends where it is not.
+fn expect_contraction<S: System>(memory: &mut PlantMemory, step: &Step<'_, S>, contraction: f64) {
+    match step.parameters.effects.contraction_delay() {
+        0.0 => *memory.contraction() = Default::default(),
+        _ => memory.contraction().begin(step.time, contraction),
+    }
+}
+
+/// The inputs as the valve feels them: their command is the one behind dead time and pilot.
+#[inline]
+fn felt<S: System>(
+    memory: &PlantMemory,
+    step: &Step<'_, S>,
+    after: f64,
+    command: impl Fn(&mut S::Inputs) -> &mut f64,
+) -> Passage<S::Inputs> {
+    let (mut inputs, mut slopes) = (step.inputs.along(&step.slopes, after), step.slopes);
+    let mut span = step.duration - after;
+    if let Some((value, slope, lasts)) =
+        memory.seen_command(step.time + after - step.parameters.effects.command_delay())
+    {
+        (*command(&mut inputs), *command(&mut slopes)) = (value, slope);
+        span = span.min(lasts);
+    }
+    (inputs, slopes, span)
+}
+
+/// Forgets what no delay reaches any more.
+#[inline]
+fn forget(memory: &mut PlantMemory, parameters: &Parameters, time: f64) {
+    if !memory.is_empty() {
+        let effects = &parameters.effects;
+        memory.forget(time - effects.command_delay(), time - effects.contraction_delay());
     }
 }
 
@@ -238,42 +434,88 @@ impl System for PneumaticActuator {
     const EFFECTS: bool = true;
     const FEEDTHROUGH: &'static [Feedthrough] = &[
         ("muscle.force", &["muscle.contraction", "muscle.contraction_velocity"]),
-        ("measured.contraction", &["muscle.contraction"]),
+        ("measured.contraction", &["muscle.contraction", "muscle.contraction_velocity"]),
         ("measured.force", &["muscle.contraction", "muscle.contraction_velocity"]),
     ];
     const INITIAL_INPUTS: &'static [&'static str] = &["muscle.contraction", "muscle.contraction_velocity"];
     const STATE_NAMES: &'static [&'static str] = &["muscle.gauge_pressure"];
     type Inputs = ActuatorInputs;
     type Outputs = ActuatorOutputs;
-    type State = [f64; DRIVEN_STATES];
-    const SCALE: Self::State = {
-        let mut scale = [1.0; DRIVEN_STATES];
-        scale[0] = 1e5;
-        scale
-    };
+    type State = Extended<1, DRIVEN_STATES>;
+    type Memory = PlantMemory;
+    const SCALE: Self::State = Extended(Effects::scales(&[1e5]));
 
-    fn initial_state(parameters: &Parameters, _: &ActuatorInputs) -> Result<Self::State> {
-        let mut state = [0.0; DRIVEN_STATES];
-        state[0] = parameters.initial.gauge_pressure;
-        Ok(state)
+    fn initial_state(parameters: &Parameters, inputs: &ActuatorInputs) -> Result<Self::State> {
+        let gauge_pressure = parameters.initial.gauge_pressure;
+        let mut state = [gauge_pressure; DRIVEN_STATES];
+        state[1..].copy_from_slice(&parameters.effects.start(&at_rest(gauge_pressure, inputs.contraction)));
+        Ok(Extended(state))
     }
 
     #[inline]
     fn rates(parameters: &Parameters, inputs: &ActuatorInputs, state: &Self::State, rates: &mut Self::State) {
-        let [gauge_pressure, own @ ..] = state;
-        let at = Point { gauge_pressure: *gauge_pressure, contraction_velocity: inputs.contraction_velocity };
-        rates[0] = pressure_rate(parameters, inputs.command, *gauge_pressure);
-        parameters.effects.rates(&at, own, &mut rates[1..]);
+        let (at, own) = driven_point(inputs, state);
+        let at = with_target(parameters, inputs.command, at, own);
+        rates.0[0] = pressure_rate(parameters, &at, own);
+        parameters.effects.rates(&at, own, &mut rates.0[1..]);
     }
 
-    fn outputs(parameters: &Parameters, _: f64, inputs: &ActuatorInputs, state: &Self::State) -> ActuatorOutputs {
-        let [gauge_pressure, own @ ..] = state;
-        driven_outputs(parameters, *gauge_pressure, inputs.contraction, inputs.contraction_velocity, own)
+    #[inline]
+    fn nominal_rates(parameters: &Parameters, inputs: &ActuatorInputs, state: &Self::State, rates: &mut Self::State) {
+        rates.0[0] = nominal_pressure_rate(parameters, inputs.command, state.0[0]);
+    }
+
+    fn outputs(
+        parameters: &Parameters,
+        time: f64,
+        inputs: &ActuatorInputs,
+        state: &Self::State,
+        memory: &PlantMemory,
+    ) -> ActuatorOutputs {
+        let (at, own) = driven_point(inputs, state);
+        driven_outputs(parameters, time, &at, own, memory)
     }
 
     fn left_range(_: &Parameters, _: &Self::State) -> Option<&'static str> {
         None
     }
+
+    #[inline]
+    fn extent(parameters: &Parameters) -> Extent {
+        extent(parameters)
+    }
+
+    #[inline]
+    fn expect(memory: &mut PlantMemory, step: &Step<'_, Self>) {
+        if nothing_to_remember(memory, step.parameters) {
+            return;
+        }
+        expect_command(memory, step, |inputs| inputs.command);
+        expect_contraction(memory, step, step.inputs.contraction);
+        if !memory.contraction().is_empty() {
+            let (value, slope) = (step.inputs.contraction, step.slopes.contraction);
+            memory.contraction().push_line(&Line { start: step.time, span: step.duration, value, slope });
+        }
+    }
+
+    #[inline]
+    fn felt(memory: &PlantMemory, step: &Step<'_, Self>, after: f64) -> Passage<ActuatorInputs> {
+        felt(memory, step, after, |inputs| &mut inputs.command)
+    }
+
+    #[inline]
+    fn forget(memory: &mut PlantMemory, parameters: &Parameters, time: f64) {
+        forget(memory, parameters, time);
+    }
+}
+
+/// The driven muscle at an instant, but for the command; and the states of the effects.
+#[inline]
+fn driven_point<'a>(inputs: &ActuatorInputs, state: &'a Extended<1, DRIVEN_STATES>) -> (Point, &'a [f64]) {
+    let [gauge_pressure, own @ ..] = &state.0;
+    let mut at = at_rest(*gauge_pressure, inputs.contraction);
+    at.contraction_velocity = inputs.contraction_velocity;
+    (at, own)
 }
 
 crate::variables::signals! {
@@ -306,43 +548,61 @@ impl System for MuscleAlone {
     const STATE_NAMES: &'static [&'static str] = &[];
     type Inputs = MeasuredInputs;
     type Outputs = ActuatorOutputs;
-    type State = [f64; Effects::STATES];
-    const SCALE: Self::State = [1.0; Effects::STATES];
+    type State = Extended<0, { Effects::STATES }>;
+    type Memory = ();
+    const SCALE: Self::State = Extended(Effects::scales(&[]));
 
-    fn initial_state(_: &Parameters, _: &MeasuredInputs) -> Result<Self::State> {
-        Ok([0.0; Effects::STATES])
+    fn initial_state(parameters: &Parameters, inputs: &MeasuredInputs) -> Result<Self::State> {
+        Ok(Extended(parameters.effects.start(&measured_point(inputs))))
     }
 
     #[inline]
     fn rates(parameters: &Parameters, inputs: &MeasuredInputs, state: &Self::State, rates: &mut Self::State) {
-        let at = Point { gauge_pressure: inputs.gauge_pressure, contraction_velocity: inputs.contraction_velocity };
-        parameters.effects.rates(&at, state, rates);
+        parameters.effects.rates(&measured_point(inputs), &state.0, &mut rates.0);
     }
 
-    fn outputs(parameters: &Parameters, _: f64, inputs: &MeasuredInputs, state: &Self::State) -> ActuatorOutputs {
-        let MeasuredInputs { gauge_pressure, contraction, contraction_velocity } = *inputs;
-        driven_outputs(parameters, gauge_pressure, contraction, contraction_velocity, state)
+    fn outputs(
+        parameters: &Parameters,
+        time: f64,
+        inputs: &MeasuredInputs,
+        state: &Self::State,
+        (): &(),
+    ) -> ActuatorOutputs {
+        driven_outputs(parameters, time, &measured_point(inputs), &state.0, &PlantMemory::default())
     }
 
     fn left_range(_: &Parameters, _: &Self::State) -> Option<&'static str> {
         None
     }
+
+    #[inline]
+    fn extent(parameters: &Parameters) -> Extent {
+        extent(parameters)
+    }
+}
+
+/// The muscle alone at an instant.
+#[inline]
+fn measured_point(inputs: &MeasuredInputs) -> Point {
+    let mut at = at_rest(inputs.gauge_pressure, inputs.contraction);
+    at.contraction_velocity = inputs.contraction_velocity;
+    at
 }
 
 /// Outputs of a muscle whose motion is given; `own` are the states of the effects.
+#[inline]
 fn driven_outputs(
     parameters: &Parameters,
-    gauge_pressure: f64,
-    contraction: f64,
-    contraction_velocity: f64,
+    time: f64,
+    at: &Point,
     own: &[f64],
+    memory: &PlantMemory,
 ) -> ActuatorOutputs {
-    let at = Point { gauge_pressure, contraction_velocity };
-    let force = muscle_force(parameters, &at, contraction, own);
-    let shown = parameters.effects.readings(Readings { contraction, gauge_pressure, force });
+    let force = muscle_force(parameters, at, own);
+    let shown = readings(parameters, time, at, force, memory);
     ActuatorOutputs {
         force,
-        gauge_pressure,
+        gauge_pressure: at.gauge_pressure,
         measured_contraction: shown.contraction,
         measured_gauge_pressure: shown.gauge_pressure,
         measured_force: shown.force,

@@ -104,13 +104,14 @@ impl System for ReferenceTrajectory {
     type Inputs = NoInputs;
     type Outputs = Setpoint;
     type State = [f64; 0];
+    type Memory = ();
     const SCALE: [f64; 0] = [];
 
     fn initial_state(_: &Parameters, _: &NoInputs) -> Result<[f64; 0]> {
         Ok([])
     }
     fn rates(_: &Parameters, _: &NoInputs, _: &[f64; 0], _: &mut [f64; 0]) {}
-    fn outputs(parameters: &Parameters, time: f64, _: &NoInputs, _: &[f64; 0]) -> Setpoint {
+    fn outputs(parameters: &Parameters, time: f64, _: &NoInputs, _: &[f64; 0], (): &()) -> Setpoint {
         parameters.reference.at(time)
     }
     fn left_range(_: &Parameters, _: &[f64; 0]) -> Option<&'static str> {

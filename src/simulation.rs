@@ -6,7 +6,7 @@ use crate::model::{Simulator, System};
 use crate::parameters::Parameters;
 use crate::plant::{
     ActuatorInputs, ActuatorOutputs, MeasuredInputs, MuscleAlone, MuscleInputs, MuscleOutputs, PneumaticActuator,
-    PneumaticMuscle, holding_pressure,
+    PneumaticMuscle, resting_pressure, steady_pressure,
 };
 use crate::reference::ReferenceTrajectory;
 use crate::variables::Signals;
@@ -44,35 +44,30 @@ const START_SAMPLES: usize = 5;
 /// Simulates an experiment with its recorded inputs, which are joined by straight lines.
 ///
 /// With a hanging load the input is the command; without, it is the contraction with the command or, where there is
-/// none, with the measured pressure. A hanging load starts at rest at the first measured pressure.
+/// none, with the measured pressure. Measured inputs are what the sensors showed: the effects on the sensors are undone.
+/// The simulation starts at rest at the first measured pressure or, where there is none, at the one that the first
+/// command leads to.
 ///
 /// # Errors
 /// [`crate::Error::NoEquilibrium`], [`crate::Error::Diverged`].
 pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
+    let Some(command) = recording.bridged(Signal::Command) else { return replay_muscle(parameters, recording) };
     let mut parameters = *parameters;
+    parameters.initial.gauge_pressure = initial_pressure(&parameters, recording, command[0]);
     let time = &recording.time;
-    let command = recording.bridged(Signal::Command);
-    let pressure = recording.bridged(Signal::GaugePressure);
-    parameters.initial.gauge_pressure = match (&pressure, &command) {
-        (Some(pressure), _) => mean(&pressure[..START_SAMPLES.min(pressure.len())]).max(0.0),
-        (None, Some(command)) => parameters.valve.target_pressure(command[0]),
-        (None, None) => 0.0,
-    };
-    if let (Some(mass), Some(command)) = (recording.load_mass(), &command) {
+    if let Some(mass) = recording.load_mass() {
         parameters.load.mass = mass;
-        let inputs = |k: usize| MuscleInputs { command: command[k], external_force: 0.0 };
+        let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
-        return follow::<PneumaticMuscle>(&parameters, time, inputs, shown, &[]);
+        return follow::<PneumaticMuscle>(&parameters, time, inputs, shown, None, &[]);
     }
-    let Some(command) = command else { return replay_muscle(&parameters, recording) };
-    let contraction = true_contraction(&parameters, recording);
-    let velocity = slopes(time, &contraction);
-    let inputs = |k: usize| ActuatorInputs {
+    let motion = Motion::of(&parameters, recording);
+    let inputs = |k: usize, pull: f64| ActuatorInputs {
         command: command[k],
-        contraction: contraction[k],
-        contraction_velocity: velocity[k],
+        contraction: motion.contraction(k, pull),
+        contraction_velocity: motion.velocity[k],
     };
-    follow::<PneumaticActuator>(&parameters, time, inputs, driven_readings, &[Signal::Contraction])
+    follow::<PneumaticActuator>(&parameters, time, inputs, driven_readings, motion.pull(), &[Signal::Contraction])
 }
 
 /// Simulates the muscle alone, from measured pressure and contraction to force: free of errors of valve and load.
@@ -81,22 +76,80 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
 /// As [`replay`].
 pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
     let nothing = || vec![0.0; recording.time.len()];
-    let pressure = recording.bridged(Signal::GaugePressure).unwrap_or_else(nothing);
-    let contraction = true_contraction(parameters, recording);
-    let velocity = slopes(&recording.time, &contraction);
-    let inputs = |k: usize| MeasuredInputs {
+    let mut pressure = recording.bridged(Signal::GaugePressure).unwrap_or_else(nothing);
+    pressure.iter_mut().for_each(|reading| *reading = parameters.effects.true_pressure(*reading));
+    let motion = Motion::of(parameters, recording);
+    let inputs = |k: usize, pull: f64| MeasuredInputs {
         gauge_pressure: pressure[k],
-        contraction: contraction[k],
-        contraction_velocity: velocity[k],
+        contraction: motion.contraction(k, pull),
+        contraction_velocity: motion.velocity[k],
     };
     let given = [Signal::Contraction, Signal::GaugePressure];
-    follow::<MuscleAlone>(parameters, &recording.time, inputs, driven_readings, &given)
+    follow::<MuscleAlone>(parameters, &recording.time, inputs, driven_readings, motion.pull(), &given)
 }
 
-/// The contraction behind the readings of the position sensor.
-fn true_contraction(parameters: &Parameters, recording: &Recording) -> Vec<f64> {
-    let measured = recording.bridged(Signal::Contraction).unwrap_or_else(|| vec![0.0; recording.time.len()]);
-    measured.into_iter().map(|reading| parameters.effects.true_contraction(reading)).collect()
+/// Gauge pressure in Pa at the start of a recording.
+fn initial_pressure(parameters: &Parameters, recording: &Recording, command: f64) -> f64 {
+    match recording.bridged(Signal::GaugePressure) {
+        Some(readings) => {
+            let first = mean(&readings[..START_SAMPLES.min(readings.len())]);
+            parameters.effects.true_pressure(first).max(0.0)
+        }
+        None => {
+            let contraction = recording.bridged(Signal::Contraction).map_or(0.0, |readings| readings[0]);
+            steady_pressure(parameters, command, parameters.effects.true_contraction(contraction, 0.0))
+        }
+    }
+}
+
+/// A prescribed motion behind the readings of the position sensor.
+struct Motion<'a> {
+    parameters: &'a Parameters,
+    /// Readings without their delay, m.
+    readings: Vec<f64>,
+    /// Velocity in m/s; the rate at which something in series stretches is neglected.
+    velocity: Vec<f64>,
+}
+
+impl<'a> Motion<'a> {
+    fn of(parameters: &'a Parameters, recording: &Recording) -> Self {
+        let time = &recording.time;
+        let mut readings = recording.bridged(Signal::Contraction).unwrap_or_else(|| vec![0.0; time.len()]);
+        let delay = parameters.effects.contraction_delay();
+        if delay > 0.0 {
+            readings = ahead(time, &readings, delay);
+        }
+        let unstretched: Vec<f64> =
+            readings.iter().map(|reading| parameters.effects.true_contraction(*reading, 0.0)).collect();
+        Self { parameters, velocity: slopes(time, &unstretched), readings }
+    }
+
+    /// Contraction in m at a sample, while the muscle pulls with a force in N.
+    fn contraction(&self, sample: usize, pull: f64) -> f64 {
+        self.parameters.effects.true_contraction(self.readings[sample], pull)
+    }
+
+    /// What tells the pull of the muscle, where the contraction behind a reading depends on it.
+    fn pull(&self) -> Option<fn(&ActuatorOutputs) -> f64> {
+        let stretches = |pull: f64| self.parameters.effects.true_contraction(0.0, pull);
+        (stretches(0.0) != stretches(100.0)).then_some(|out| out.force)
+    }
+}
+
+/// A series as it will be by a delay in s later, its last value held.
+fn ahead(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
+    let mut next = 0;
+    let value = |time_wanted: f64| {
+        while next < time.len() && time[next] <= time_wanted {
+            next += 1;
+        }
+        if next == time.len() {
+            return values[next - 1];
+        }
+        let share = (time_wanted - time[next - 1]) / (time[next] - time[next - 1]);
+        values[next - 1] + share * (values[next] - values[next - 1])
+    };
+    time.iter().map(|time| time + delay).map(value).collect()
 }
 
 fn driven_readings(out: &ActuatorOutputs) -> [f64; 3] {
@@ -104,26 +157,37 @@ fn driven_readings(out: &ActuatorOutputs) -> [f64; 3] {
 }
 
 /// Simulates a system whose inputs are joined by straight lines between the given times.
+///
+/// `inputs` are those at a sample while the muscle pulls with some force in N; where they depend on it, `pull` tells it.
 fn follow<S: System>(
     parameters: &Parameters,
     time: &[f64],
-    inputs: impl Fn(usize) -> S::Inputs,
+    inputs: impl Fn(usize, f64) -> S::Inputs,
     shown: impl Fn(&S::Outputs) -> [f64; 3],
+    pull: Option<fn(&S::Outputs) -> f64>,
     given: &[Signal],
 ) -> Result<Replay> {
     let mut simulator = Simulator::<S>::new(*parameters);
-    simulator.inputs = inputs(0);
+    simulator.inputs = inputs(0, 0.0);
     simulator.initialize(time[0])?;
+    let mut force = 0.0;
+    if let Some(pull) = pull {
+        force = balance(&mut simulator, |force| inputs(0, force), pull, force);
+        simulator.initialize(time[0])?;
+    }
     let mut replay = Replay { given: given.to_vec(), ..Replay::default() };
     for k in 0..time.len() {
-        simulator.inputs = inputs(k);
-        let [gauge_pressure, contraction, force] = shown(&simulator.outputs());
+        match pull {
+            None => simulator.inputs = inputs(k, 0.0),
+            Some(pull) => force = balance(&mut simulator, |force| inputs(k, force), pull, force),
+        }
+        let [gauge_pressure, contraction, reading] = shown(&simulator.outputs());
         replay.gauge_pressure.push(gauge_pressure);
         replay.contraction.push(contraction);
-        replay.force.push(force);
+        replay.force.push(reading);
         if k + 1 < time.len() {
             let span = time[k + 1] - time[k];
-            let difference = inputs(k + 1).along(&inputs(k), -1.0);
+            let difference = inputs(k + 1, force).along(&simulator.inputs, -1.0);
             simulator.slopes = S::Inputs::default().along(&difference, 1.0 / span);
             simulator.advance(span)?;
         }
@@ -131,23 +195,70 @@ fn follow<S: System>(
     Ok(replay)
 }
 
+/// Sets the inputs such that the muscle pulls with the force in N that they presuppose, and gives it; by secants from a
+/// guess.
+fn balance<S: System>(
+    simulator: &mut Simulator<S>,
+    inputs: impl Fn(f64) -> S::Inputs,
+    pull: fn(&S::Outputs) -> f64,
+    guess: f64,
+) -> f64 {
+    const CLOSE: f64 = 1e-6;
+    const MOST_SECANTS: usize = 10;
+    let mut surplus = |force: f64| {
+        simulator.inputs = inputs(force);
+        pull(&simulator.outputs()) - force
+    };
+    let (mut before, mut surplus_before) = (guess, surplus(guess));
+    let mut force = guess + surplus_before;
+    for _ in 0..MOST_SECANTS {
+        let surplus_now = surplus(force);
+        let secant = (surplus_now - surplus_before) / (force - before);
+        if surplus_now.abs() < CLOSE || secant == 0.0 || !secant.is_finite() {
+            break;
+        }
+        (before, surplus_before) = (force, surplus_now);
+        force -= surplus_now / secant;
+    }
+    force
+}
+
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Rate of change at every sample: slope of the least-squares line through the nearest samples, which keeps the noise
-/// of a position sensor out of the velocity.
+/// Half width in s of the window from which a velocity is taken.
+const HALF_WINDOW: f64 = 0.04;
+/// Fewest samples to either side in such a window.
+const FEWEST_BESIDE: usize = 2;
+
+/// Rate of change at every sample: slope of the least-squares line through the samples around it, which keeps the noise
+/// of a position sensor out of the velocity. The window is one of time, so that a finer sampling gives no more noise.
 pub fn slopes(time: &[f64], values: &[f64]) -> Vec<f64> {
-    const HALF_WINDOW: usize = 4;
+    let (mut first, mut end) = (0, 0);
     (0..time.len())
         .map(|k| {
-            let window = k.saturating_sub(HALF_WINDOW)..(k + HALF_WINDOW + 1).min(time.len());
-            let (t, y) = (&time[window.clone()], &values[window]);
-            let (mean_t, mean_y) = (mean(t), mean(y));
-            let covariance: f64 = t.iter().zip(y).map(|(t, y)| (t - mean_t) * (y - mean_y)).sum();
-            covariance / t.iter().map(|t| (t - mean_t).powi(2)).sum::<f64>()
+            while time[first] < time[k] - HALF_WINDOW {
+                first += 1;
+            }
+            while end < time.len() && time[end] <= time[k] + HALF_WINDOW {
+                end += 1;
+            }
+            let window = first.min(k.saturating_sub(FEWEST_BESIDE))..end.max(k + FEWEST_BESIDE + 1).min(time.len());
+            slope(&time[window.clone()], &values[window])
         })
         .collect()
+}
+
+/// Slope of the least-squares line; zero for a single sample.
+fn slope(time: &[f64], values: &[f64]) -> f64 {
+    let mean_time = mean(time);
+    let (mut covariance, mut variance) = (0.0, 0.0);
+    for (time, value) in time.iter().zip(values) {
+        covariance += (time - mean_time) * value;
+        variance += (time - mean_time).powi(2);
+    }
+    if variance > 0.0 { covariance / variance } else { 0.0 }
 }
 
 /// Rms difference of the samples that both have; `None` where they have none in common.
@@ -180,7 +291,7 @@ impl ClosedLoop {
 pub fn at_rest_on_reference(parameters: &Parameters) -> Parameters {
     let mut parameters = *parameters;
     let weight = parameters.load.mass * GRAVITY;
-    parameters.initial.gauge_pressure = holding_pressure(&parameters, parameters.reference.start, weight).max(0.0);
+    parameters.initial.gauge_pressure = resting_pressure(&parameters, parameters.reference.start, weight);
     parameters
 }
 

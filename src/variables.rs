@@ -41,7 +41,11 @@ pub mod units {
         NEWTON_PER_METRE2 = "N/m2", "StiffnessSlope", 1e5, [1, -1, -2, 0, 0];
         NEWTON_PER_METRE3 = "N/m3", "StiffnessCurvature", 1e6, [1, -2, -2, 0, 0];
         NEWTON_SECOND_PER_METRE = "N.s/m", "Damping", 100.0, [1, 0, -1, 0, 0];
+        METRE_PER_NEWTON = "m/N", "Compliance", 1e-5, [-1, 0, 2, 0, 0];
         PASCAL = "Pa", "Pressure", 1e5, [1, -1, -2, 0, 0];
+        PASCAL_PER_SECOND = "Pa/s", "PressureRate", 1e5, [1, -1, -3, 0, 0];
+        PER_SECOND = "1/s", "Rate", 1.0, [0, 0, -1, 0, 0];
+        PER_VOLT = "1/V", "GainSlope", 0.1, [-1, -2, 3, 1, 0];
         VOLT = "V", "Voltage", 1.0, [1, 2, -3, -1, 0];
         PASCAL_PER_VOLT = "Pa/V", "ValveGain", 1e5, [0, -3, 1, 1, 0];
         RADIAN_PER_SECOND = "rad/s", "AngularFrequency", 10.0, [0, 0, -1, 0, 1];

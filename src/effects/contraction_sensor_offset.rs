@@ -9,6 +9,9 @@ crate::variables::variables! {
     /// # In the data
     /// A constant residual of the contraction, also at rest. Without it in the force, it is not a change of the muscle.
     ///
+    /// # Validity
+    /// Constant over a recording.
+    ///
     /// # Reference
     /// Definition of an offset.
     pub struct ContractionSensorOffset in "contraction_sensor_offset." as Tunable {
@@ -26,16 +29,20 @@ impl Effect for ContractionSensorOffset {
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
         of_load: false,
-        forms: &[&[("contraction_sensor_offset.offset", &[1e-3])]],
+        forms: &[&[("contraction_sensor_offset.offset", &[5e-3, -5e-3])]],
         refinements: &[],
     };
+
+    fn is_neutral(&self) -> bool {
+        self.offset == 0.0
+    }
 
     fn readings(&self, readings: Readings) -> Readings {
         Readings { contraction: readings.contraction + self.offset, ..readings }
     }
 
-    fn true_contraction(&self, measured: f64) -> f64 {
-        measured - self.offset
+    fn true_contraction(&self, reading: f64, _force: f64) -> f64 {
+        reading - self.offset
     }
 
     fn sentence(&self) -> String {

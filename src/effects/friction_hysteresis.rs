@@ -1,22 +1,27 @@
 use super::{Description, Effect, Point};
 
 crate::variables::variables! {
-    /// Dry friction between threads and rubber, in the form of Dahl.
+    /// Dry friction between threads and rubber: a loss that depends on the way, not on its speed.
     ///
     /// # Model
-    /// F ← F − (w₀ + w₁ p) z, dz/dt = (v − |v| z) / s: half width w₀ (`half_width`), its growth with pressure w₁
-    /// (`half_width_per_pressure`), presliding displacement s, contraction velocity v. z stays within ±1.
+    /// F ← F − (w₀ + w₁ p) h (1 + c exp(−(v/v_s)²)), with the loop h = (1 − m) z₁ + m z₂ of two elements that pass it
+    /// within the displacements s and r s: s dz/dx = 1 − (γ sgn(v z) + 1 − γ) |z|ⁿ. `half_width` w₀,
+    /// `half_width_per_pressure` w₁, `presliding_displacement` s, `second_share` m, `second_ratio` r, `knee` n,
+    /// `unloading` γ, `stribeck_share` c, `stribeck_velocity` v_s. n = γ = 1 is the law of Dahl. Both z start at
+    /// `start` and stay within ±1.
     ///
     /// # In the data
     /// The force residual changes sign at every reversal; its width does not depend on speed. Triangles of shrinking
     /// amplitude separate it from viscous damping (three speeds) and from a valve lag (vanishes when slow).
     ///
     /// # Validity
-    /// Smooth loops, as of FESTO muscles whose threads are embedded in rubber; no stick-slip (Stribeck).
+    /// Smooth loops, as of FESTO muscles whose threads are embedded in rubber. With the Stribeck term the load may creep
+    /// in jerks, but it never sticks for good.
     ///
     /// # Reference
-    /// P. Dahl (1968), A solid friction model, TOR-0158(3107-18)-1; pressure dependence as in Tondu and Lopez,
-    /// thesis eq. 4.20, with the sign function replaced by z.
+    /// P. Dahl (1968), A solid friction model, TOR-0158(3107-18)-1; Y. Wen (1976), Method for random vibration of
+    /// hysteretic systems (n, γ); pressure dependence and Stribeck term as in Tondu and Lopez, thesis eq. 4.20, with the
+    /// sign function replaced by h.
     pub struct FrictionHysteresis in "friction_hysteresis." as Tunable {
         /// Half width of the loop at zero pressure
         half_width: f64 = 0.0, NEWTON, (0.0..=2000.0);
@@ -24,6 +29,20 @@ crate::variables::variables! {
         half_width_per_pressure: f64 = 0.0, SQUARE_METRE, (0.0..=0.02);
         /// Displacement after a reversal at which most of the loop is passed
         presliding_displacement: f64 = 2e-3, METRE, (1e-5..=0.1);
+        /// Share of the second element in the loop
+        second_share: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Presliding displacement of the second element, relative to the first
+        second_ratio: f64 = 4.0, ONE, (1.0..=50.0);
+        /// Sharpness of the knee of the loop
+        knee: f64 = 1.0, ONE, (0.5..=6.0);
+        /// How much steeper the loop is right after a reversal: 1 twice as steep, 0.5 not at all
+        unloading: f64 = 1.0, ONE, (0.0..=1.0);
+        /// Relative excess of the friction at rest over that in motion
+        stribeck_share: f64 = 0.0, ONE, (-0.5..=2.0);
+        /// Velocity over which that excess fades
+        stribeck_velocity: f64 = 0.01, METRE_PER_SECOND, (1e-4..=1.0);
+        /// Where in the loop the friction starts: -1 after lengthening, 1 after shortening
+        start: f64 = 0.0, ONE, (-1.0..=1.0);
     }
 }
 
@@ -31,35 +50,73 @@ impl FrictionHysteresis {
     fn width(&self, gauge_pressure: f64) -> f64 {
         self.half_width + self.half_width_per_pressure * gauge_pressure.max(0.0)
     }
+
+    /// Rate of an element at `z` while the muscle moves by `velocity` in units of its displacement per second.
+    fn rate(&self, velocity: f64, z: f64) -> f64 {
+        let speed = velocity.abs();
+        if self.knee == 1.0 && self.unloading == 1.0 {
+            return velocity - speed * z;
+        }
+        let loading = if velocity * z > 0.0 { 1.0 } else { 1.0 - 2.0 * self.unloading };
+        velocity * (1.0 - loading * z.abs().powf(self.knee))
+    }
+
+    fn stribeck(&self, velocity: f64) -> f64 {
+        if self.stribeck_share == 0.0 {
+            return 1.0;
+        }
+        1.0 + self.stribeck_share * (-(velocity / self.stribeck_velocity).powi(2)).exp()
+    }
 }
 
 impl Effect for FrictionHysteresis {
     const DESCRIPTION: Description = Description {
         name: "friction_hysteresis",
         meaning: "dry friction in the braid: a loss that does not depend on speed",
-        equation: "F <- F - (w0 + w1 p) z,  dz/dt = (v - |v| z)/s",
+        equation: "F <- F - (w0 + w1 p) h (1 + c exp(-(v/v_s)^2)),  h of two elements s dz/dx = 1 - z sgn(v)",
         signature: "force residual changes sign at reversals, width independent of speed",
         experiment: "triangles of shrinking amplitude at three pressures",
-        reference: "Dahl 1968; thesis eq. 4.20",
+        reference: "Dahl 1968; Wen 1976; thesis eq. 4.20",
         of_load: false,
         forms: &[&[
-            ("friction_hysteresis.half_width", &[10.0]),
-            ("friction_hysteresis.half_width_per_pressure", &[3e-5]),
-            ("friction_hysteresis.presliding_displacement", &[2e-3]),
+            ("friction_hysteresis.half_width", &[10.0, 25.0]),
+            ("friction_hysteresis.half_width_per_pressure", &[3e-5, 1e-4]),
+            ("friction_hysteresis.presliding_displacement", &[1e-3, 4e-3]),
         ]],
-        refinements: &[],
+        refinements: &[
+            ("friction_hysteresis.second_share", &[0.4]),
+            ("friction_hysteresis.second_ratio", &[5.0]),
+            ("friction_hysteresis.knee", &[1.5]),
+            ("friction_hysteresis.unloading", &[0.7]),
+            ("friction_hysteresis.stribeck_share", &[0.1]),
+            ("friction_hysteresis.start", &[0.3, -0.3]),
+        ],
     };
-    const STATES: usize = 1;
+    const STATE_SCALES: &'static [f64] = &[1.0, 1.0];
 
-    fn muscle_force(&self, at: &Point, own: &[f64], force: f64) -> f64 {
-        force - self.width(at.gauge_pressure) * own[0]
+    fn is_neutral(&self) -> bool {
+        self.half_width == 0.0 && self.half_width_per_pressure == 0.0
+    }
+
+    fn start(&self, _at: &Point, own: &mut [f64]) {
+        own.fill(self.start);
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
-        // Without friction the state rests, so that it cannot touch the step size of the integrator.
-        let active = self.half_width != 0.0 || self.half_width_per_pressure != 0.0;
-        let velocity = if active { at.contraction_velocity } else { 0.0 };
-        rates[0] = (velocity - velocity.abs() * own[0]) / self.presliding_displacement;
+        let velocity = at.contraction_velocity / self.presliding_displacement;
+        rates[0] = self.rate(velocity, own[0]);
+        // A second element that does not count rests, so that it cannot touch the step size of the integrator.
+        if self.second_share != 0.0 {
+            rates[1] = self.rate(velocity / self.second_ratio, own[1]);
+        }
+    }
+
+    fn muscle_force(&self, at: &Point, own: &[f64], force: f64) -> f64 {
+        if self.is_neutral() {
+            return force;
+        }
+        let looped = (1.0 - self.second_share) * own[0] + self.second_share * own[1];
+        force - self.width(at.gauge_pressure) * looped * self.stribeck(at.contraction_velocity)
     }
 
     fn sentence(&self) -> String {

@@ -1,18 +1,46 @@
 //! What makes a nominal model wrong: one file per physical effect.
 //!
 //! Every effect is always compiled in and exactly neutral at its default, so that extending a model is freeing
-//! parameters. An effect acts through the hooks of [`Effect`] that concern it and leaves the others as they are.
+//! parameters. An effect acts through the hooks of [`Effect`] that concern it and leaves the others as they are. The
+//! hooks follow the signal: command, pressure, force, motion, readings; where several effects share one, they act in the
+//! order of the list.
 
+use crate::memory::Slack;
 use crate::variables::{Declared, Variable};
 
 /// The plant at one instant, as the hooks of an effect see it.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
+    /// Gauge pressure that the command asks for, Pa; with a measured pressure, that one.
+    pub commanded_pressure: f64,
+    /// Gauge pressure that the valve goes for, Pa: the commanded one after all effects on it.
+    pub target_pressure: f64,
     /// Gauge pressure in the muscle, Pa.
     pub gauge_pressure: f64,
+    /// Contraction, m.
+    pub contraction: f64,
     /// Rate of the contraction, m/s.
     pub contraction_velocity: f64,
 }
+
+impl Point {
+    /// Gauge pressure in units of the one at which sizes that grow with it are stated, [`REFERENCE_PRESSURE`].
+    fn relative_pressure(&self) -> f64 {
+        self.gauge_pressure / REFERENCE_PRESSURE
+    }
+
+    /// Contraction in units of the one at which sizes that grow with it are stated, [`REFERENCE_CONTRACTION`].
+    fn relative_contraction(&self) -> f64 {
+        self.contraction / REFERENCE_CONTRACTION
+    }
+}
+
+/// Gauge pressure in Pa at which sizes that change with pressure are stated: the middle of the usual range.
+pub const REFERENCE_PRESSURE: f64 = 2e5;
+/// Contraction in m at which sizes that change with contraction are stated.
+pub const REFERENCE_CONTRACTION: f64 = 0.1;
+/// Ambient pressure in Pa, for what depends on absolute pressure.
+pub const AMBIENT_PRESSURE: f64 = 1e5;
 
 /// What the sensors show.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,36 +88,113 @@ impl Description {
 }
 
 /// A physical effect: its parameters, its states, and the places where it acts.
+///
+/// `own` are the states of the effect. Every hook must return what it was given, to the last bit, while the effect is
+/// neutral.
 pub trait Effect: Declared + Default {
     /// What it is.
     const DESCRIPTION: Description;
-    /// How many states it adds to the plant. They start at zero.
-    const STATES: usize = 0;
+    /// Usual sizes of the states that it adds to the plant, one each.
+    const STATE_SCALES: &'static [f64] = &[];
 
+    /// Whether it changes nothing, whatever its shape parameters are.
+    fn is_neutral(&self) -> bool;
+    /// One sentence for a person about the size that was found.
+    fn sentence(&self) -> String;
+
+    /// Sets the states at the start; they are zero before.
+    fn start(&self, _at: &Point, _own: &mut [f64]) {}
+    /// Rates of the states, per second; they are zero before.
+    fn rates(&self, _at: &Point, _own: &[f64], _rates: &mut [f64]) {}
+
+    /// How the pilot of the valve fails to follow its command.
+    fn slack(&self) -> Slack {
+        Slack::default()
+    }
+    /// Time in s by which the valve sees its command late.
+    fn command_delay(&self) -> f64 {
+        0.0
+    }
+    /// Command in V on which the valve acts.
+    fn command(&self, command: f64) -> f64 {
+        command
+    }
+    /// Gauge pressure in Pa that the valve goes for; that of the point is not known yet.
+    fn target_pressure(&self, _at: &Point, _own: &[f64], target: f64) -> f64 {
+        target
+    }
     /// Cut-off of the valve in rad/s.
-    fn valve_bandwidth(&self, bandwidth: f64) -> f64 {
+    fn valve_bandwidth(&self, _at: &Point, bandwidth: f64) -> f64 {
         bandwidth
     }
-    /// Moving mass in kg.
-    fn mass(&self, mass: f64) -> f64 {
-        mass
+    /// Rate of the gauge pressure in Pa/s.
+    fn pressure_rate(&self, _at: &Point, _own: &[f64], rate: f64) -> f64 {
+        rate
+    }
+
+    /// Gauge pressure in Pa that drives the muscle.
+    fn effective_pressure(&self, _at: &Point, pressure: f64) -> f64 {
+        pressure
+    }
+    /// Contraction in m that the membrane feels.
+    fn effective_contraction(&self, _at: &Point, _own: &[f64], contraction: f64) -> f64 {
+        contraction
+    }
+    /// Pull in N of the pressure on the virtual area.
+    fn area_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
+        force
+    }
+    /// Pull in N of the elastic membrane.
+    fn elastic_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
+        force
+    }
+    /// Static pull in N, of pressure and membrane together.
+    fn static_force(&self, force: f64) -> f64 {
+        force
     }
     /// Pull of the muscle in N.
     fn muscle_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
         force
     }
-    /// Rates of the effect's own states, per second.
-    fn rates(&self, _at: &Point, _own: &[f64], _rates: &mut [f64]) {}
+    /// Moving mass in kg.
+    fn mass(&self, mass: f64) -> f64 {
+        mass
+    }
+
+    /// Time in s by which the position sensor is late.
+    fn contraction_delay(&self) -> f64 {
+        0.0
+    }
     /// What the sensors show.
     fn readings(&self, readings: Readings) -> Readings {
         readings
     }
-    /// Contraction in m at which the position sensor shows what it does: undoes what this effect does to the reading.
-    fn true_contraction(&self, measured: f64) -> f64 {
-        measured
+    /// Contraction in m behind a reading of the position sensor, while the muscle pulls with a force in N.
+    fn true_contraction(&self, reading: f64, _force: f64) -> f64 {
+        reading
     }
-    /// One sentence for a person about the size that was found.
-    fn sentence(&self) -> String;
+    /// Gauge pressure in Pa behind a reading of the pressure sensor.
+    fn true_pressure(&self, reading: f64) -> f64 {
+        reading
+    }
+}
+
+/// A hook of all effects that have states, one after the other; `states` are those of all effects.
+macro_rules! chained {
+    ($doc:literal; $hook:ident; $($field:ident: $Effect:ident;)*) => {
+        #[doc = concat!($doc, " `states` are those of all effects.")]
+        #[inline]
+        pub fn $hook(&self, at: &Point, states: &[f64], mut value: f64) -> f64 {
+            let mut rest = states;
+            $(
+                let (own, others) = rest.split_at($Effect::STATE_SCALES.len());
+                rest = others;
+                value = self.$field.$hook(at, own, value);
+            )*
+            let _ = rest;
+            value
+        }
+    };
 }
 
 macro_rules! effects {
@@ -107,67 +212,145 @@ macro_rules! effects {
 
         impl Effects {
             /// States that all effects together add to the plant.
-            pub const STATES: usize = 0 $(+ $Effect::STATES)*;
+            pub const STATES: usize = 0 $(+ $Effect::STATE_SCALES.len())*;
             /// What each effect is, in the order of the list.
             pub const DESCRIPTIONS: &'static [Description] = &[$($Effect::DESCRIPTION,)*];
+            const STATE_SCALES: &'static [&'static [f64]] = &[$($Effect::STATE_SCALES,)*];
 
-            /// Cut-off of the valve in rad/s, all effects applied.
+            /// Whether no effect is at work.
             #[inline]
-            pub fn valve_bandwidth(&self, mut bandwidth: f64) -> f64 {
-                $(bandwidth = self.$field.valve_bandwidth(bandwidth);)*
-                bandwidth
+            pub fn are_neutral(&self) -> bool {
+                true $(&& self.$field.is_neutral())*
             }
 
-            /// Moving mass in kg, all effects applied.
+            /// Whether the states of all effects rest.
             #[inline]
-            pub fn mass(&self, mut mass: f64) -> f64 {
-                $(mass = self.$field.mass(mass);)*
-                mass
-            }
-
-            /// Pull of the muscle in N, all effects applied; `states` are those of all effects.
-            #[inline]
-            pub fn muscle_force(&self, at: &Point, states: &[f64], mut force: f64) -> f64 {
-                let mut rest = states;
-                $(
-                    let (own, others) = rest.split_at($Effect::STATES);
-                    rest = others;
-                    force = self.$field.muscle_force(at, own, force);
-                )*
-                let _ = rest;
-                force
-            }
-
-            /// Rates of the states of all effects, per second.
-            #[inline]
-            pub fn rates(&self, at: &Point, states: &[f64], rates: &mut [f64]) {
-                let (mut rest, mut rest_rates) = (states, rates);
-                $(
-                    let (own, others) = rest.split_at($Effect::STATES);
-                    let (own_rates, other_rates) = rest_rates.split_at_mut($Effect::STATES);
-                    (rest, rest_rates) = (others, other_rates);
-                    self.$field.rates(at, own, own_rates);
-                )*
-                let _ = (rest, rest_rates);
-            }
-
-            /// What the sensors show, all effects applied.
-            #[inline]
-            pub fn readings(&self, mut readings: Readings) -> Readings {
-                $(readings = self.$field.readings(readings);)*
-                readings
-            }
-
-            /// Contraction in m at which the position sensor shows what it does, all effects undone.
-            pub fn true_contraction(&self, mut measured: f64) -> f64 {
-                $(measured = self.$field.true_contraction(measured);)*
-                measured
+            pub fn are_stateless(&self) -> bool {
+                true $(&& ($Effect::STATE_SCALES.is_empty() || self.$field.is_neutral()))*
             }
 
             /// The sentence of the effect with this name.
             pub fn sentence(&self, name: &str) -> Option<String> {
                 $(if $Effect::DESCRIPTION.name == name { return Some(self.$field.sentence()); })*
                 None
+            }
+
+            /// States of all effects at the start.
+            pub fn start(&self, at: &Point) -> [f64; Self::STATES] {
+                let mut states = [0.0; Self::STATES];
+                let mut rest = &mut states[..];
+                $(
+                    let (own, others) = rest.split_at_mut($Effect::STATE_SCALES.len());
+                    rest = others;
+                    self.$field.start(at, own);
+                )*
+                let _ = rest;
+                states
+            }
+
+            /// Rates of the states of all effects, per second; those of neutral effects are zero.
+            #[inline]
+            pub fn rates(&self, at: &Point, states: &[f64], rates: &mut [f64]) {
+                let (mut rest, mut rest_rates) = (states, rates);
+                $(
+                    let (own, others) = rest.split_at($Effect::STATE_SCALES.len());
+                    let (own_rates, other_rates) = rest_rates.split_at_mut($Effect::STATE_SCALES.len());
+                    (rest, rest_rates) = (others, other_rates);
+                    own_rates.fill(0.0);
+                    if !own.is_empty() && !self.$field.is_neutral() {
+                        self.$field.rates(at, own, own_rates);
+                    }
+                )*
+                let _ = (rest, rest_rates);
+            }
+
+            /// How the pilot of the valve fails to follow its command.
+            pub fn slack(&self) -> Slack {
+                let mut all = Slack::default();
+                $(
+                    let slack = self.$field.slack();
+                    all.play += slack.play;
+                    all.stiction += slack.stiction;
+                    all.start += slack.start;
+                )*
+                all
+            }
+
+            /// Time in s by which the valve sees its command late.
+            #[inline]
+            pub fn command_delay(&self) -> f64 {
+                0.0 $(+ self.$field.command_delay())*
+            }
+
+            /// Time in s by which the position sensor is late.
+            #[inline]
+            pub fn contraction_delay(&self) -> f64 {
+                0.0 $(+ self.$field.contraction_delay())*
+            }
+
+            chained! { "Gauge pressure in Pa that the valve goes for."; target_pressure; $($field: $Effect;)* }
+            chained! { "Rate of the gauge pressure in Pa/s."; pressure_rate; $($field: $Effect;)* }
+            chained! { "Contraction in m that the membrane feels."; effective_contraction; $($field: $Effect;)* }
+            chained! { "Pull in N of the pressure on the virtual area."; area_force; $($field: $Effect;)* }
+            chained! { "Pull in N of the elastic membrane."; elastic_force; $($field: $Effect;)* }
+            chained! { "Pull of the muscle in N."; muscle_force; $($field: $Effect;)* }
+
+            /// Command in V on which the valve acts.
+            #[inline]
+            pub fn command(&self, mut command: f64) -> f64 {
+                $(command = self.$field.command(command);)*
+                command
+            }
+
+            /// Cut-off of the valve in rad/s.
+            #[inline]
+            pub fn valve_bandwidth(&self, at: &Point, mut bandwidth: f64) -> f64 {
+                $(bandwidth = self.$field.valve_bandwidth(at, bandwidth);)*
+                bandwidth
+            }
+
+            /// Gauge pressure in Pa that drives the muscle.
+            #[inline]
+            pub fn effective_pressure(&self, at: &Point, mut pressure: f64) -> f64 {
+                $(pressure = self.$field.effective_pressure(at, pressure);)*
+                pressure
+            }
+
+            /// Static pull in N, of pressure and membrane together.
+            #[inline]
+            pub fn static_force(&self, mut force: f64) -> f64 {
+                $(force = self.$field.static_force(force);)*
+                force
+            }
+
+            /// Moving mass in kg.
+            #[inline]
+            pub fn mass(&self, mut mass: f64) -> f64 {
+                $(mass = self.$field.mass(mass);)*
+                mass
+            }
+
+            /// What the sensors show.
+            #[inline]
+            pub fn readings(&self, mut readings: Readings) -> Readings {
+                $(readings = self.$field.readings(readings);)*
+                readings
+            }
+
+            /// Contraction in m behind a reading of the position sensor, while the muscle pulls with a force in N; a
+            /// delay is not undone.
+            pub fn true_contraction(&self, reading: f64, force: f64) -> f64 {
+                // The last effect on a reading is the first to be undone.
+                let undo = |reading: f64| reading;
+                $(let undo = |reading: f64| undo(self.$field.true_contraction(reading, force));)*
+                undo(reading)
+            }
+
+            /// Gauge pressure in Pa behind a reading of the pressure sensor.
+            pub fn true_pressure(&self, reading: f64) -> f64 {
+                let undo = |reading: f64| reading;
+                $(let undo = |reading: f64| undo(self.$field.true_pressure(reading));)*
+                undo(reading)
             }
         }
 
@@ -182,11 +365,53 @@ macro_rules! effects {
     };
 }
 
-// One line per effect: adding one is its file and a line here.
+// One line per effect: adding one is its file and a line here. In the order of the signal.
 effects! {
+    valve_dead_band: ValveDeadBand;
+    valve_dead_time: ValveDeadTime;
+    valve_gain: ValveGain;
+    valve_offset: ValveOffset;
+    valve_lag: ValveLag;
+    supply_saturation: SupplySaturation;
+    valve_resonance: ValveResonance;
+    flow_limit: FlowLimit;
+    leakage: Leakage;
+    threshold_pressure: ThresholdPressure;
+    end_effects: EndEffects;
+    creep: Creep;
+    temperature_drift: TemperatureDrift;
+    bladder_stiffness: BladderStiffness;
+    force_gain: ForceGain;
     friction_hysteresis: FrictionHysteresis;
     viscous_damping: ViscousDamping;
-    valve_lag: ValveLag;
     payload_mass: PayloadMass;
+    series_elasticity: SeriesElasticity;
+    contraction_sensor_gain: ContractionSensorGain;
     contraction_sensor_offset: ContractionSensorOffset;
+    contraction_sensor_delay: ContractionSensorDelay;
+    pressure_sensor_gain: PressureSensorGain;
+    pressure_sensor_offset: PressureSensorOffset;
+    force_sensor_gain: ForceSensorGain;
+    force_sensor_offset: ForceSensorOffset;
+}
+
+impl Effects {
+    /// Usual sizes of the states of a plant: those of its own states, then those of the effects.
+    pub(crate) const fn scales<const N: usize>(own: &[f64]) -> [f64; N] {
+        let mut all = [1.0; N];
+        let (mut filled, mut group) = (0, 0);
+        while filled < own.len() {
+            all[filled] = own[filled];
+            filled += 1;
+        }
+        while group < Self::STATE_SCALES.len() {
+            let mut k = 0;
+            while k < Self::STATE_SCALES[group].len() {
+                all[filled] = Self::STATE_SCALES[group][k];
+                (filled, k) = (filled + 1, k + 1);
+            }
+            group += 1;
+        }
+        all
+    }
 }

@@ -4,7 +4,8 @@ crate::variables::variables! {
     /// A load that is not what was entered.
     ///
     /// # Model
-    /// M ← M + ΔM: `additional_mass` ΔM.
+    /// M ← M (1 + m) + ΔM: `additional_mass` ΔM, the same with every load (a hanger that was not weighed),
+    /// `relative_error` m of what was entered (a wrong scale).
     ///
     /// # In the data
     /// The force residual is in proportion to g + d²x/dt², also at rest; the resonance shifts. With one load only it
@@ -15,6 +16,8 @@ crate::variables::variables! {
     pub struct PayloadMass in "payload_mass." as Tunable {
         /// Mass beyond the entered one
         additional_mass: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
+        /// Relative error of the entered mass
+        relative_error: f64 = 0.0, ONE, (-0.9..=3.0);
     }
 }
 
@@ -22,21 +25,30 @@ impl Effect for PayloadMass {
     const DESCRIPTION: Description = Description {
         name: "payload_mass",
         meaning: "the load is not what was entered",
-        equation: "M <- M + dM",
+        equation: "M <- M (1 + m) + dM",
         signature: "force residual in proportion to g + acceleration, also at rest",
         experiment: "two known masses, static and dynamic",
         reference: "thesis eq. 5.4",
         of_load: true,
-        forms: &[&[("payload_mass.additional_mass", &[1.0])]],
+        forms: &[&[("payload_mass.additional_mass", &[2.0, -2.0])], &[("payload_mass.relative_error", &[0.1, -0.1])]],
         refinements: &[],
     };
 
+    fn is_neutral(&self) -> bool {
+        self.additional_mass == 0.0 && self.relative_error == 0.0
+    }
+
     fn mass(&self, mass: f64) -> f64 {
-        mass + self.additional_mass
+        mass * (1.0 + self.relative_error) + self.additional_mass
     }
 
     fn sentence(&self) -> String {
-        let (size, word) = (self.additional_mass.abs(), if self.additional_mass < 0.0 { "lighter" } else { "heavier" });
-        format!("The load is {size:.2} kg {word} than entered.")
+        let word = |change: f64| if change < 0.0 { "lighter" } else { "heavier" };
+        let (mass, percent) = (self.additional_mass, 100.0 * self.relative_error);
+        if percent == 0.0 {
+            return format!("The load is {:.2} kg {} than entered.", mass.abs(), word(mass));
+        }
+        let beyond = if mass == 0.0 { String::new() } else { format!(", and {mass:+.2} kg") };
+        format!("The load is {:.1} % {} than entered{beyond}.", percent.abs(), word(percent))
     }
 }

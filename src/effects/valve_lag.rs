@@ -1,20 +1,34 @@
-use super::{Description, Effect};
+use super::{Description, Effect, Point};
+
+/// The time constant stays above this share of what it is at the reference pressure.
+const LEAST_SHARE: f64 = 0.05;
 
 crate::variables::variables! {
     /// A valve that follows more slowly than nominal.
     ///
     /// # Model
-    /// 1/ω ← 1/ω + τ: the time constant of the first-order valve grows by τ (`time_constant`).
+    /// 1/ω ← 1/ω + τ (1 + g (p/p₀ − 1)), times 1 + e while emptying: `time_constant` τ at p₀ = 2 bar, its
+    /// `growth_with_pressure` g, `emptying_excess` e. A hose or pilot stage before the valve is a pole of its own:
+    /// τ₂ dq/dt = p_target − q, and the valve goes for q: `second_time_constant` τ₂.
     ///
     /// # In the data
     /// The pressure residual is in proportion to the rate of pressure and vanishes when the command is slow; steps of
     /// several sizes separate it from a dead time (whose onset shifts) and from a rate limit (large steps only).
     ///
+    /// # Validity
+    /// The time constant is kept above 5 % of its value at 2 bar. The second pole starts settled at the first pressure.
+    ///
     /// # Reference
     /// Thesis eq. 5.3.
     pub struct ValveLag in "valve_lag." as Tunable {
-        /// Time constant beyond the nominal one
+        /// Time constant beyond the nominal one, at 2 bar
         time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
+        /// Time constant of a second pole before the valve
+        second_time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
+        /// Relative change of the additional time constant from 0 to 2 bar
+        growth_with_pressure: f64 = 0.0, ONE, (-0.9..=3.0);
+        /// Relative excess of the additional time constant while emptying
+        emptying_excess: f64 = 0.0, ONE, (-0.9..=5.0);
     }
 }
 
@@ -22,23 +36,59 @@ impl Effect for ValveLag {
     const DESCRIPTION: Description = Description {
         name: "valve_lag",
         meaning: "the valve is slower than nominal",
-        equation: "1/w <- 1/w + tau",
+        equation: "1/w <- 1/w + tau (1 + g (p/p0 - 1));  tau2 dq/dt = p_target - q",
         signature: "pressure residual in proportion to the rate of pressure, gone when slow",
         experiment: "steps of several sizes with pressure recorded",
         reference: "thesis eq. 5.3",
         of_load: false,
-        forms: &[&[("valve_lag.time_constant", &[0.05])]],
-        refinements: &[],
+        forms: &[&[("valve_lag.time_constant", &[0.05])], &[("valve_lag.second_time_constant", &[0.05])]],
+        refinements: &[
+            ("valve_lag.time_constant", &[0.02]),
+            ("valve_lag.second_time_constant", &[0.02]),
+            ("valve_lag.growth_with_pressure", &[0.2, -0.2]),
+            ("valve_lag.emptying_excess", &[0.2]),
+        ],
     };
+    const STATE_SCALES: &'static [f64] = &[1e5];
 
-    fn valve_bandwidth(&self, bandwidth: f64) -> f64 {
+    fn is_neutral(&self) -> bool {
+        self.time_constant == 0.0 && self.second_time_constant == 0.0
+    }
+
+    fn start(&self, at: &Point, own: &mut [f64]) {
+        own[0] = at.gauge_pressure;
+    }
+
+    fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
+        if self.second_time_constant > 0.0 {
+            rates[0] = (at.commanded_pressure - own[0]) / self.second_time_constant.max(1e-4);
+        }
+    }
+
+    fn target_pressure(&self, _at: &Point, own: &[f64], target: f64) -> f64 {
+        if self.second_time_constant == 0.0 { target } else { own[0] }
+    }
+
+    fn valve_bandwidth(&self, at: &Point, bandwidth: f64) -> f64 {
         if self.time_constant == 0.0 {
             return bandwidth; // 1/(1/w) need not be w to the last bit
         }
-        1.0 / (1.0 / bandwidth + self.time_constant)
+        let growth = (1.0 + self.growth_with_pressure * (at.relative_pressure() - 1.0)).max(LEAST_SHARE);
+        let emptying = if at.target_pressure < at.gauge_pressure { 1.0 + self.emptying_excess } else { 1.0 };
+        1.0 / (1.0 / bandwidth + self.time_constant * growth * emptying)
     }
 
     fn sentence(&self) -> String {
-        format!("The valve is slower than nominal: its time constant is {:.0} ms longer.", self.time_constant * 1e3)
+        let (longer, second) = (self.time_constant * 1e3, self.second_time_constant * 1e3);
+        if self.second_time_constant == 0.0 {
+            format!("The valve is slower than nominal: its time constant is {longer:.0} ms longer.")
+        } else if self.time_constant == 0.0 {
+            format!("The valve is slower than nominal: a second delay of first order, {second:.0} ms, comes before it.")
+        } else {
+            format!(
+                "The valve is slower than nominal: its time constant is {longer:.0} ms longer, and a second delay \
+                     of first order, {second:.0} ms, comes before it."
+            )
+        }
     }
 }

@@ -1,10 +1,16 @@
 use super::{Description, Effect, Point};
 
+/// Velocity in m/s at which the damping is stated.
+const REFERENCE_VELOCITY: f64 = 0.05;
+/// Velocity in m/s below which a power law goes over into a straight line; not physical, it keeps the slope finite.
+const SMALL_VELOCITY: f64 = 1e-3;
+
 crate::variables::variables! {
     /// Viscous damping beyond the nominal one, different for shortening and lengthening.
     ///
     /// # Model
-    /// F ← F − B v, with B = `contraction` for v > 0 and `extension` for v < 0.
+    /// F ← F − B v |v/v₀|ᵃ, with B = `contraction` for v > 0 and `extension` for v < 0, stated at v₀ = 0.05 m/s, and
+    /// `exponent` a.
     ///
     /// # In the data
     /// A loop of the force residual that grows with speed; the same triangle at three speeds separates it from dry
@@ -12,6 +18,7 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// Together with `muscle.damping`, 80 N s/m by default, the sum must not be negative for the motion to be damped.
+    /// Below 1 mm/s the power law is rounded to a straight line.
     ///
     /// # Reference
     /// D. Reynolds et al. (2003), Modeling the dynamic characteristics of pneumatic muscle, doi 10.1114/1.1554921
@@ -21,6 +28,8 @@ crate::variables::variables! {
         contraction: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-80.0..=1e4);
         /// Additional damping while the muscle lengthens
         extension: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-80.0..=1e4);
+        /// Growth of the additional damping with speed: 0 none, 1 in proportion
+        exponent: f64 = 0.0, ONE, (-0.9..=2.0);
     }
 }
 
@@ -28,18 +37,29 @@ impl Effect for ViscousDamping {
     const DESCRIPTION: Description = Description {
         name: "viscous_damping",
         meaning: "a loss that grows with velocity, unlike in shortening and lengthening",
-        equation: "F <- F - B v,  B = B_contraction (v > 0) or B_extension (v < 0)",
+        equation: "F <- F - B v |v/v0|^a,  B = B_contraction (v > 0) or B_extension (v < 0)",
         signature: "loop of the force residual grows with speed",
         experiment: "the same triangle at three speeds",
         reference: "Reynolds et al. 2003; thesis eq. 3.47",
         of_load: false,
         forms: &[&[("viscous_damping.contraction", &[200.0]), ("viscous_damping.extension", &[200.0])]],
-        refinements: &[],
+        refinements: &[("viscous_damping.exponent", &[0.2, -0.2])],
     };
 
+    fn is_neutral(&self) -> bool {
+        self.contraction == 0.0 && self.extension == 0.0
+    }
+
     fn muscle_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
+        if self.is_neutral() {
+            return force;
+        }
         let v = at.contraction_velocity;
-        force - v * if v > 0.0 { self.contraction } else { self.extension }
+        let growth = match self.exponent {
+            0.0 => 1.0,
+            exponent => (v.hypot(SMALL_VELOCITY) / REFERENCE_VELOCITY).powf(exponent),
+        };
+        force - v * growth * if v > 0.0 { self.contraction } else { self.extension }
     }
 
     fn sentence(&self) -> String {

@@ -1,0 +1,52 @@
+use super::{Description, Effect, Readings};
+
+crate::variables::variables! {
+    /// A position sensor whose scale is off.
+    ///
+    /// # Model
+    /// x_measured ← x_measured (1 + g): `relative_error` g.
+    ///
+    /// # In the data
+    /// The residual of the contraction is in proportion to the contraction; the force is as it should be for the true one.
+    ///
+    /// # Validity
+    /// Constant over a recording.
+    ///
+    /// # Reference
+    /// Definition of a gain.
+    pub struct ContractionSensorGain in "contraction_sensor_gain." as Tunable {
+        /// Relative error of the position sensor
+        relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
+    }
+}
+
+impl Effect for ContractionSensorGain {
+    const DESCRIPTION: Description = Description {
+        name: "contraction_sensor_gain",
+        meaning: "the scale of the position sensor is off",
+        equation: "x_measured <- x_measured (1 + g)",
+        signature: "residual of the contraction in proportion to it",
+        experiment: "compare with a ruler at two lengths",
+        reference: "definition",
+        of_load: false,
+        forms: &[&[("contraction_sensor_gain.relative_error", &[0.05, -0.05])]],
+        refinements: &[],
+    };
+
+    fn is_neutral(&self) -> bool {
+        self.relative_error == 0.0
+    }
+
+    fn readings(&self, readings: Readings) -> Readings {
+        Readings { contraction: readings.contraction * (1.0 + self.relative_error), ..readings }
+    }
+
+    fn true_contraction(&self, reading: f64, _force: f64) -> f64 {
+        reading / (1.0 + self.relative_error)
+    }
+
+    fn sentence(&self) -> String {
+        let word = if self.relative_error < 0.0 { "less" } else { "more" };
+        format!("The position sensor shows {:.1} % {word} than there is.", 100.0 * self.relative_error.abs())
+    }
+}

@@ -1,0 +1,86 @@
+use super::{Description, Effect, Point};
+
+crate::variables::variables! {
+    /// Creep: the membrane gives way slowly.
+    ///
+    /// # Model
+    /// The membrane feels x − d₁ − d₂, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
+    /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing
+    /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r).
+    ///
+    /// # In the data
+    /// Contraction drifts for seconds at constant measured pressure, unlike up and down; in a prescribed motion the force
+    /// does. A leak drifts in the pressure; hysteresis does not depend on time.
+    ///
+    /// # Validity
+    /// 2 to 20 % of a step over 0.5 to 100 s. By default the muscle counts as relaxed where it starts, so that a
+    /// simulation starts at rest; a relaxed share of zero is a muscle that comes from its rest length.
+    ///
+    /// # Reference
+    /// Kelvin–Voigt model of viscoelasticity; for muscles T. Minh et al. (2010),
+    /// doi 10.1016/j.mechatronics.2010.04.003 (creep and hysteresis of a McKibben muscle).
+    pub struct Creep in "creep." as Tunable {
+        /// Drift per contraction, first element
+        amplitude_1: f64 = 0.0, ONE, (-0.5..=1.0);
+        /// Time constant, first element
+        time_1: f64 = 3.0, SECOND, (0.05..=300.0);
+        /// Drift per contraction, second element
+        amplitude_2: f64 = 0.0, ONE, (-0.5..=1.0);
+        /// Time constant, second element
+        time_2: f64 = 20.0, SECOND, (0.05..=300.0);
+        /// Share of the contraction at the start that no drift belongs to
+        relaxed_share: f64 = 1.0, ONE, (0.0..=1.0);
+        /// Share of the remaining drift that lies before the start
+        settled_share: f64 = 0.0, ONE, (0.0..=1.0);
+    }
+}
+
+impl Effect for Creep {
+    const DESCRIPTION: Description = Description {
+        name: "creep",
+        meaning: "slow visco-elastic drift of the membrane at constant pressure",
+        equation: "x <- x - d1 - d2;  tau_i d(d_i)/dt + d_i = a_i (x - x_r)",
+        signature: "drift over seconds at constant measured pressure",
+        experiment: "hold for a minute after a step, up and down",
+        reference: "Kelvin-Voigt; Minh et al. 2010",
+        of_load: false,
+        forms: &[&[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])]],
+        refinements: &[
+            ("creep.amplitude_2", &[0.05]),
+            ("creep.time_2", &[20.0, 0.5]),
+            ("creep.relaxed_share", &[0.5]),
+            ("creep.settled_share", &[0.5]),
+        ],
+    };
+    /// Both drifts, and the contraction where nothing drifts.
+    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1];
+
+    fn is_neutral(&self) -> bool {
+        self.amplitude_1 == 0.0 && self.amplitude_2 == 0.0
+    }
+
+    fn start(&self, at: &Point, own: &mut [f64]) {
+        let relaxed = self.relaxed_share * at.contraction;
+        let settled = self.settled_share * (at.contraction - relaxed);
+        own.copy_from_slice(&[self.amplitude_1 * settled, self.amplitude_2 * settled, relaxed]);
+    }
+
+    fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
+        let strain = at.contraction - own[2];
+        rates[0] = (self.amplitude_1 * strain - own[0]) / self.time_1;
+        rates[1] = (self.amplitude_2 * strain - own[1]) / self.time_2;
+    }
+
+    fn effective_contraction(&self, _at: &Point, own: &[f64], contraction: f64) -> f64 {
+        if self.is_neutral() { contraction } else { contraction - own[0] - own[1] }
+    }
+
+    fn sentence(&self) -> String {
+        let one = |amplitude: f64, time: f64| format!("{:.1} % within {time:.1} s", 100.0 * amplitude);
+        let mut parts = one(self.amplitude_1, self.time_1);
+        if self.amplitude_2 != 0.0 {
+            parts += &format!(" and {}", one(self.amplitude_2, self.time_2));
+        }
+        format!("The membrane creeps: of every change of length it gives way by {parts}.")
+    }
+}

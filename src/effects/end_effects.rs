@@ -1,0 +1,61 @@
+use super::{Description, Effect, Point};
+
+/// Gauge pressure in Pa over which the part that belongs to low pressure fades.
+const FADE: f64 = 1e5;
+
+crate::variables::variables! {
+    /// Ends that are no cylinder: the middle of the muscle contracts more than the whole.
+    ///
+    /// # Model
+    /// The braid feels k x in place of the contraction x, k = 1 + c + a exp(−p/1 bar): `excess` c,
+    /// `low_pressure_excess` a.
+    ///
+    /// # In the data
+    /// The force residual grows with the contraction and with pressure; with the rest length it shrinks.
+    ///
+    /// # Validity
+    /// k of 1.0 to 1.3 is usual for muscles of 10 to 30 diameters.
+    ///
+    /// # Reference
+    /// B. Tondu, P. Lopez (2000), Modeling and control of McKibben artificial muscle robot actuators,
+    /// doi 10.1109/37.833638 (factor k); k(p) = a exp(−b p) + c: C. Kothera et al. (2009), doi 10.1115/1.3158982.
+    pub struct EndEffects in "end_effects." as Tunable {
+        /// By how much the contraction counts more than once
+        excess: f64 = 0.0, ONE, (-0.5..=1.0);
+        /// By how much more it counts without pressure
+        low_pressure_excess: f64 = 0.0, ONE, (-0.5..=1.0);
+    }
+}
+
+impl Effect for EndEffects {
+    const DESCRIPTION: Description = Description {
+        name: "end_effects",
+        meaning: "the ends are no cylinder: the contraction counts k times",
+        equation: "x <- x (1 + c + a exp(-p/1 bar))",
+        signature: "force residual grows with contraction and pressure",
+        experiment: "compare two rest lengths",
+        reference: "Tondu and Lopez 2000; Kothera et al. 2009",
+        of_load: false,
+        forms: &[&[("end_effects.excess", &[0.1])]],
+        refinements: &[("end_effects.low_pressure_excess", &[0.05])],
+    };
+
+    fn is_neutral(&self) -> bool {
+        self.excess == 0.0 && self.low_pressure_excess == 0.0
+    }
+
+    fn effective_contraction(&self, at: &Point, _own: &[f64], contraction: f64) -> f64 {
+        let mut excess = self.excess;
+        if self.low_pressure_excess != 0.0 {
+            excess += self.low_pressure_excess * (-at.gauge_pressure / FADE).exp();
+        }
+        contraction + excess * at.contraction
+    }
+
+    fn sentence(&self) -> String {
+        let at_two_bar = 1.0 + self.excess + self.low_pressure_excess * (-2e5 / FADE).exp();
+        format!(
+            "The ends of the muscle contract less than its middle: at 2 bar the contraction counts {at_two_bar:.2} times."
+        )
+    }
+}

@@ -1,0 +1,101 @@
+use super::{AMBIENT_PRESSURE, Description, Effect, Point, REFERENCE_PRESSURE};
+
+/// Rate in Pa/s from which on there is no limit.
+const NONE: f64 = 1e9;
+
+crate::variables::variables! {
+    /// Filling and emptying that are limited in rate.
+    ///
+    /// # Model
+    /// The rate r of pressure becomes r / (1 + |r/m|ⁿ)^(1/n), n = 1/`roundness`; for zero roundness it is clipped at m.
+    /// The limit m is `filling` or `emptying`; the latter changes with absolute pressure by the share
+    /// `emptying_with_pressure` c, m (1 − c + c (p + 1 bar)/3 bar), and both shrink with the volume,
+    /// m / (1 + `volume_growth` x/0.1 m).
+    ///
+    /// # In the data
+    /// After large steps the pressure rises along a ramp whose slope does not depend on the size of the step, and falls
+    /// along another; small steps are as nominal.
+    ///
+    /// # Validity
+    /// A stand-in for ISO 6358: choked inflow gives a constant rate, choked outflow one in proportion to absolute
+    /// pressure; the exponent in between is no physical constant.
+    ///
+    /// # Reference
+    /// ISO 6358-1:2013, Pneumatic fluid power; deviation: rates instead of conductances.
+    pub struct FlowLimit in "flow_limit." as Tunable {
+        /// Largest rate of filling; there is no limit at the largest value
+        filling: f64 = NONE, PASCAL_PER_SECOND, (1e3..=NONE);
+        /// Largest rate of emptying, at 2 bar; there is no limit at the largest value
+        emptying: f64 = NONE, PASCAL_PER_SECOND, (1e3..=NONE);
+        /// How gently the limit sets in: 0 at once, 0.5 as a square root
+        roundness: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Share of the emptying that is in proportion to absolute pressure
+        emptying_with_pressure: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Relative growth of the volume at 0.1 m of contraction
+        volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
+    }
+}
+
+impl FlowLimit {
+    fn limit(&self, at: &Point, rate: f64) -> f64 {
+        let most = if rate > 0.0 {
+            self.filling
+        } else {
+            let absolute = (at.gauge_pressure + AMBIENT_PRESSURE) / (REFERENCE_PRESSURE + AMBIENT_PRESSURE);
+            self.emptying * (1.0 + self.emptying_with_pressure * (absolute - 1.0))
+        };
+        most / (1.0 + self.volume_growth * at.relative_contraction()).max(0.1)
+    }
+}
+
+impl Effect for FlowLimit {
+    const DESCRIPTION: Description = Description {
+        name: "flow_limit",
+        meaning: "filling and emptying are limited in rate",
+        equation: "r <- r/(1 + |r/m|^n)^(1/n),  m = filling or emptying",
+        signature: "ramps of the pressure after large steps, unlike up and down; small steps as nominal",
+        experiment: "steps of several sizes, up and down",
+        reference: "ISO 6358",
+        of_load: false,
+        forms: &[
+            &[("flow_limit.filling", &[0.5e5, 1.2e5, 3e5]), ("flow_limit.emptying", &[0.5e5, 1.2e5, 3e5])],
+            &[
+                ("flow_limit.filling", &[0.5e5, 1.2e5, 3e5]),
+                ("flow_limit.emptying", &[0.5e5, 1.2e5, 3e5]),
+                ("flow_limit.roundness", &[0.5]),
+            ],
+        ],
+        refinements: &[
+            ("flow_limit.roundness", &[0.3]),
+            ("flow_limit.emptying_with_pressure", &[0.3]),
+            ("flow_limit.volume_growth", &[0.2]),
+        ],
+    };
+
+    fn is_neutral(&self) -> bool {
+        self.filling >= NONE && self.emptying >= NONE
+    }
+
+    fn pressure_rate(&self, at: &Point, _own: &[f64], rate: f64) -> f64 {
+        if self.is_neutral() {
+            return rate;
+        }
+        let most = self.limit(at, rate);
+        let excess = (rate / most).abs();
+        // Below 1 % roundness nobody could tell the curve from the corner.
+        if self.roundness < 0.01 {
+            return rate.max(-most).min(most);
+        }
+        if self.roundness == 0.5 {
+            return rate / (1.0 + excess * excess).sqrt();
+        }
+        rate / (1.0 + excess.powf(1.0 / self.roundness)).powf(self.roundness)
+    }
+
+    fn sentence(&self) -> String {
+        let say = |rate: f64| {
+            if rate >= NONE { "without limit".to_owned() } else { format!("at most {:.2} bar/s", rate * 1e-5) }
+        };
+        format!("The muscle fills {} and empties {}.", say(self.filling), say(self.emptying))
+    }
+}

@@ -1,0 +1,49 @@
+use super::{Description, Effect, Readings};
+
+crate::variables::variables! {
+    /// A force sensor whose scale is off.
+    ///
+    /// # Model
+    /// F_measured ← F_measured (1 + g): `relative_error` g.
+    ///
+    /// # In the data
+    /// The residual of the force is in proportion to the force, while the motion is as nominal; with a gain of the muscle the
+    /// motion follows.
+    ///
+    /// # Validity
+    /// Constant over a recording.
+    ///
+    /// # Reference
+    /// Definition of a gain.
+    pub struct ForceSensorGain in "force_sensor_gain." as Tunable {
+        /// Relative error of the force sensor
+        relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
+    }
+}
+
+impl Effect for ForceSensorGain {
+    const DESCRIPTION: Description = Description {
+        name: "force_sensor_gain",
+        meaning: "the scale of the force sensor is off",
+        equation: "F_measured <- F_measured (1 + g)",
+        signature: "residual of the force in proportion to it",
+        experiment: "hang two known masses on the sensor",
+        reference: "definition",
+        of_load: false,
+        forms: &[&[("force_sensor_gain.relative_error", &[0.05, -0.05])]],
+        refinements: &[],
+    };
+
+    fn is_neutral(&self) -> bool {
+        self.relative_error == 0.0
+    }
+
+    fn readings(&self, readings: Readings) -> Readings {
+        Readings { force: readings.force * (1.0 + self.relative_error), ..readings }
+    }
+
+    fn sentence(&self) -> String {
+        let word = if self.relative_error < 0.0 { "less" } else { "more" };
+        format!("The force sensor shows {:.1} % {word} than there is.", 100.0 * self.relative_error.abs())
+    }
+}

@@ -1,0 +1,63 @@
+use super::{Description, Effect, Point};
+
+/// Ceiling in Pa from which on there is none: beyond what any muscle stands.
+const NONE: f64 = 2e6;
+
+crate::variables::variables! {
+    /// A supply whose pressure is too low for the command.
+    ///
+    /// # Model
+    /// p_target ← min(p_target, p_s − d max(p_target − p, 0)): `gauge_pressure` p_s of the supply, its `droop` d while
+    /// it fills the muscle. With `rounding` r the minimum is r-soft: p_target − r ln(1 + exp((p_target − ceiling)/r)).
+    ///
+    /// # In the data
+    /// The pressure residual is zero below a ceiling and grows one to one with the command above it.
+    ///
+    /// # Validity
+    /// A supply of constant pressure behind a regulator, or with a droop in proportion to what the muscle lacks.
+    ///
+    /// # Reference
+    /// Definition of saturation; droop as in data sheets of pressure regulators (0.5 to 1.75 bar).
+    pub struct SupplySaturation in "supply_saturation." as Tunable {
+        /// Gauge pressure of the supply; there is no limit at the largest value
+        gauge_pressure: f64 = NONE, PASCAL, (1e3..=NONE);
+        /// Pressure over which the ceiling is rounded
+        rounding: f64 = 0.0, PASCAL, (0.0..=1e5);
+        /// Loss of supply pressure per pressure that the muscle lacks
+        droop: f64 = 0.0, ONE, (0.0..=1.0);
+    }
+}
+
+impl Effect for SupplySaturation {
+    const DESCRIPTION: Description = Description {
+        name: "supply_saturation",
+        meaning: "the supply pressure is too low for the command",
+        equation: "p_target <- min(p_target, p_s - d max(p_target - p, 0))",
+        signature: "pressure residual above a ceiling only",
+        experiment: "record the supply pressure; raise it",
+        reference: "definition",
+        of_load: false,
+        forms: &[&[("supply_saturation.gauge_pressure", &[1.5e5, 2.5e5, 3.5e5, 4.5e5])]],
+        refinements: &[("supply_saturation.rounding", &[3e3]), ("supply_saturation.droop", &[0.01, 0.1])],
+    };
+
+    fn is_neutral(&self) -> bool {
+        self.gauge_pressure >= NONE
+    }
+
+    fn target_pressure(&self, at: &Point, _own: &[f64], target: f64) -> f64 {
+        if self.is_neutral() {
+            return target;
+        }
+        let ceiling = self.gauge_pressure - self.droop * (target - at.gauge_pressure).max(0.0);
+        let excess = target - ceiling;
+        if self.rounding == 0.0 || excess.abs() > 40.0 * self.rounding {
+            return target.min(ceiling);
+        }
+        target - self.rounding * (excess / self.rounding).exp().ln_1p()
+    }
+
+    fn sentence(&self) -> String {
+        format!("The supply gives no more than {:.2} bar.", self.gauge_pressure * 1e-5)
+    }
+}

@@ -1,0 +1,71 @@
+use super::{Description, Effect, Point};
+
+crate::variables::variables! {
+    /// Pressure that is lost before the muscle responds.
+    ///
+    /// # Model
+    /// The area feels p − l exp(−(p/f)ᵉ) (1 − d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
+    /// `decrease_with_contraction` d.
+    ///
+    /// # In the data
+    /// The force falls short at low pressure only, by the same in both directions; above a bar or two nothing is wrong.
+    /// An offset of the pressure sensor does not fade, a dead band of the valve has a direction.
+    ///
+    /// # Validity
+    /// 0.2 to 1 bar are usual. With a large exponent the loss ends at once.
+    ///
+    /// # Reference
+    /// C. Chou, B. Hannaford (1996), Measurement and modeling of McKibben pneumatic artificial muscles,
+    /// doi 10.1109/70.481753 (bladder that does not touch the braid yet); deviation: the loss fades.
+    pub struct ThresholdPressure in "threshold_pressure." as Tunable {
+        /// Pressure that is lost at zero pressure
+        lost: f64 = 0.0, PASCAL, (0.0..=4e5);
+        /// Pressure over which the loss fades
+        fade: f64 = 0.8e5, PASCAL, (0.2e5..=2.5e5);
+        /// How suddenly the loss fades: 1 gradually
+        exponent: f64 = 1.0, ONE, (0.5..=6.0);
+        /// Relative decrease of the loss at 0.1 m of contraction
+        decrease_with_contraction: f64 = 0.0, ONE, (-1.0..=1.0);
+    }
+}
+
+impl Effect for ThresholdPressure {
+    const DESCRIPTION: Description = Description {
+        name: "threshold_pressure",
+        meaning: "pressure lost before the muscle responds, which matters at low pressure",
+        equation: "p <- max(0, p - l exp(-(p/f)^e) (1 - d x/0.1 m))",
+        signature: "force falls short at low pressure only, the same in both directions",
+        experiment: "slow ramps of the pressure from zero at two lengths",
+        reference: "Chou and Hannaford 1996",
+        of_load: false,
+        forms: &[&[("threshold_pressure.lost", &[0.4e5, 1e5]), ("threshold_pressure.fade", &[0.6e5, 1.2e5])]],
+        refinements: &[
+            ("threshold_pressure.exponent", &[1.5, 2.5]),
+            ("threshold_pressure.decrease_with_contraction", &[0.2]),
+        ],
+    };
+
+    fn is_neutral(&self) -> bool {
+        self.lost == 0.0
+    }
+
+    fn effective_pressure(&self, at: &Point, pressure: f64) -> f64 {
+        if self.is_neutral() {
+            return pressure;
+        }
+        let relative = at.gauge_pressure.max(0.0) / self.fade;
+        let power = if self.exponent == 1.0 { relative } else { relative.powf(self.exponent) };
+        let contracted = 1.0 - self.decrease_with_contraction * at.relative_contraction();
+        // A pressure that was negative before is no business of this effect.
+        (pressure - self.lost * (-power).exp() * contracted.max(0.0)).max(pressure.min(0.0))
+    }
+
+    fn sentence(&self) -> String {
+        let at_one_bar = self.lost * (-(1e5 / self.fade).powf(self.exponent)).exp();
+        format!(
+            "At low pressure the muscle responds late: {:.2} bar are lost at first, {:.2} bar at 1 bar.",
+            self.lost * 1e-5,
+            at_one_bar * 1e-5
+        )
+    }
+}

@@ -1,0 +1,81 @@
+use super::{Description, Effect, Point};
+use crate::memory::Slack;
+
+crate::variables::variables! {
+    /// A pilot stage that does not follow small changes of the command.
+    ///
+    /// # Model
+    /// Play: the pilot w moves only where the command u pushes it, |u − w| ≤ `play`. Stiction: it rests until
+    /// |u − w| reaches `stiction`, and jumps to u then. Overlap: the spool opens no port while the pressure is off its
+    /// target by less than `pressure_overlap`. All three may be there, in this order.
+    ///
+    /// # In the data
+    /// The pressure residual in slow stairs with the muscle locked: a constant that changes sign with the direction
+    /// (play), or steps of one size (stiction). Unlike hysteresis of the muscle it is in the pressure.
+    ///
+    /// # Validity
+    /// Exact for a command of straight lines. A sticking pilot that jumps more than 10⁴ times per second moves along the
+    /// mean of its stairs.
+    ///
+    /// # Reference
+    /// M. Choudhury, N. Thornhill, S. Shah (2005), Modelling valve stiction, doi 10.1016/j.conengprac.2004.05.005.
+    pub struct ValveDeadBand in "valve_dead_band." as Tunable {
+        /// Half width of the play of the pilot
+        play: f64 = 0.0, VOLT, (0.0..=2.0);
+        /// Deviation from the command at which a stuck pilot jumps to it
+        stiction: f64 = 0.0, VOLT, (0.0..=2.0);
+        /// Deviation from the target pressure below which no port opens
+        pressure_overlap: f64 = 0.0, PASCAL, (0.0..=2e5);
+        /// Where in its play the pilot starts: -1 lower end, 1 upper end
+        start: f64 = 0.0, ONE, (-1.0..=1.0);
+    }
+}
+
+impl Effect for ValveDeadBand {
+    const DESCRIPTION: Description = Description {
+        name: "valve_dead_band",
+        meaning: "small changes of the command do nothing: play or stiction of the pilot",
+        equation: "|u - w| <= play;  w <- u where |u - w| >= stiction;  dp/dt = 0 where |K w - p| < overlap",
+        signature: "pressure residual of constant size that follows the direction of the command, or steps",
+        experiment: "slow stairs and ramps of the command, up and down, with the muscle locked",
+        reference: "Choudhury et al. 2005",
+        of_load: false,
+        forms: &[
+            &[("valve_dead_band.play", &[0.05, 0.15])],
+            &[("valve_dead_band.stiction", &[0.08, 0.2])],
+            &[("valve_dead_band.pressure_overlap", &[5e3])],
+        ],
+        refinements: &[("valve_dead_band.start", &[0.3, -0.3])],
+    };
+
+    fn is_neutral(&self) -> bool {
+        self.play == 0.0 && self.stiction == 0.0 && self.pressure_overlap == 0.0
+    }
+
+    fn slack(&self) -> Slack {
+        Slack { play: self.play, stiction: self.stiction, start: self.start }
+    }
+
+    fn target_pressure(&self, at: &Point, _own: &[f64], target: f64) -> f64 {
+        if self.pressure_overlap == 0.0 {
+            return target;
+        }
+        let overlap = self.pressure_overlap;
+        // Not `clamp`, which panics where a derivative tries an overlap below zero.
+        target - (target - at.gauge_pressure).max(-overlap).min(overlap)
+    }
+
+    fn sentence(&self) -> String {
+        let mut parts = Vec::new();
+        if self.play > 0.0 {
+            parts.push(format!("its pilot has a play of {:.0} mV", 2e3 * self.play));
+        }
+        if self.stiction > 0.0 {
+            parts.push(format!("its pilot sticks until the command is off by {:.0} mV", 1e3 * self.stiction));
+        }
+        if self.pressure_overlap > 0.0 {
+            parts.push(format!("no port opens for errors below {:.3} bar", 1e-5 * self.pressure_overlap));
+        }
+        format!("The valve ignores small changes of the command: {}.", parts.join(", "))
+    }
+}

@@ -1,0 +1,74 @@
+use super::{Description, Effect, Point};
+
+crate::variables::variables! {
+    /// A valve of second order, which overshoots.
+    ///
+    /// # Model
+    /// d²p/dt² = ω² e (1 + k tanh(|e|/1 bar)) − 2 ζ ω dp/dt, e = p_target − p, in place of the first-order valve:
+    /// `natural_frequency` ω, `damping_ratio` ζ, `stiffening` k with the size of the error. There is no resonance at
+    /// ω = 0.
+    ///
+    /// # In the data
+    /// The pressure rings after a step; its gain exceeds one near ω.
+    ///
+    /// # Validity
+    /// 15 to 100 rad/s and 0.3 to 0.8 are usual. Bandwidth and lag of the first-order valve mean nothing while it acts.
+    ///
+    /// # Reference
+    /// Second-order models of proportional valves, e.g. manufacturers' frequency responses; definition.
+    pub struct ValveResonance in "valve_resonance." as Tunable {
+        /// Natural frequency of the valve; zero where it is of first order
+        natural_frequency: f64 = 0.0, RADIAN_PER_SECOND, (0.0..=500.0);
+        /// Damping ratio
+        damping_ratio: f64 = 0.4, ONE, (0.02..=0.95);
+        /// Relative growth of the stiffness with errors far beyond 1 bar
+        stiffening: f64 = 0.0, ONE, (-0.5..=2.0);
+    }
+}
+
+/// Error in Pa at which most of the stiffening has come.
+const LARGE_ERROR: f64 = 1e5;
+
+impl Effect for ValveResonance {
+    const DESCRIPTION: Description = Description {
+        name: "valve_resonance",
+        meaning: "the valve is of second order and overshoots",
+        equation: "d2p/dt2 = w^2 (p_target - p) - 2 zeta w dp/dt",
+        signature: "overshoot and ringing of the pressure after steps",
+        experiment: "steps, and sines of two amplitudes around the natural frequency",
+        reference: "definition",
+        of_load: false,
+        forms: &[&[
+            ("valve_resonance.natural_frequency", &[20.0, 35.0]),
+            ("valve_resonance.damping_ratio", &[0.3, 0.5]),
+        ]],
+        refinements: &[("valve_resonance.stiffening", &[0.2])],
+    };
+    const STATE_SCALES: &'static [f64] = &[1e6];
+
+    fn is_neutral(&self) -> bool {
+        self.natural_frequency == 0.0
+    }
+
+    fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
+        let frequency = self.natural_frequency;
+        let mut error = at.target_pressure - at.gauge_pressure;
+        if self.stiffening != 0.0 {
+            error *= 1.0 + self.stiffening * (error.abs() / LARGE_ERROR).tanh();
+        }
+        rates[0] = frequency * (frequency * error - 2.0 * self.damping_ratio * own[0]);
+    }
+
+    fn pressure_rate(&self, _at: &Point, own: &[f64], rate: f64) -> f64 {
+        if self.is_neutral() { rate } else { own[0] }
+    }
+
+    fn sentence(&self) -> String {
+        let overshoot =
+            100.0 * (-std::f64::consts::PI * self.damping_ratio / (1.0 - self.damping_ratio.powi(2)).sqrt()).exp();
+        format!(
+            "The valve overshoots by {overshoot:.0} % of a step and rings at {:.1} Hz.",
+            self.natural_frequency * (1.0 - self.damping_ratio.powi(2)).sqrt() / std::f64::consts::TAU
+        )
+    }
+}

@@ -1,0 +1,380 @@
+//! What a plant remembers beyond its state: past commands and contractions, and where the pilot of the valve stuck.
+//!
+//! Inputs come as straight lines over one communication step. What is kept of them are their pieces, so that delay, play
+//! and stiction are exact and do not depend on how a line was cut into steps. Nothing is kept of an effect that is not
+//! at work.
+
+use std::collections::VecDeque;
+
+/// Instants that are closer than this, in s, count as the same: far below any step.
+const SAME_INSTANT: f64 = 1e-12;
+/// Steps of a sticking pilot that follow each other faster than this, in s, are replaced by the line through their
+/// middles: the muscle is slower by orders of magnitude.
+const FINEST_STAIR: f64 = 1e-4;
+
+/// What a model remembers beyond its state.
+pub trait Memory: Default + Clone + Send {
+    /// What brings it back to how it was before a step that failed.
+    type Mark: Copy;
+    /// See [`Memory::Mark`]; `time` in s is the present one.
+    fn mark(&self, time: f64) -> Self::Mark;
+    /// Forgets everything since the mark.
+    fn roll_back(&mut self, mark: Self::Mark);
+    /// Moves all that it remembers by a span in s.
+    fn shift(&mut self, span: f64);
+    /// Appends all that it remembers.
+    fn save(&self, saved: &mut Vec<f64>);
+    /// What [`Memory::save`] wrote; `None` for numbers that it cannot have written.
+    fn load(saved: &[f64]) -> Option<Self>;
+}
+
+impl Memory for () {
+    type Mark = ();
+    fn mark(&self, _: f64) {}
+    fn roll_back(&mut self, (): ()) {}
+    fn shift(&mut self, _: f64) {}
+    fn save(&self, _: &mut Vec<f64>) {}
+    fn load(saved: &[f64]) -> Option<Self> {
+        saved.is_empty().then_some(())
+    }
+}
+
+/// A straight line over some time.
+#[derive(Debug, Clone, Copy)]
+pub struct Line {
+    /// Where it starts, s.
+    pub start: f64,
+    /// How long it lasts, s.
+    pub span: f64,
+    /// Value at the start.
+    pub value: f64,
+    /// Change per second.
+    pub slope: f64,
+}
+
+impl Line {
+    fn at(&self, after: f64) -> f64 {
+        self.value + self.slope * after
+    }
+
+    /// The part from `after` seconds on; its length is clipped at zero.
+    fn from(&self, after: f64) -> Self {
+        Self { start: self.start + after, span: (self.span - after).max(0.0), value: self.at(after), ..*self }
+    }
+}
+
+/// A polynomial of third order that holds from an instant on until the next piece starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Piece {
+    /// Where it starts, s.
+    start: f64,
+    /// Coefficients of 1, s, s², s³, with s the time since the start.
+    coefficients: [f64; 4],
+}
+
+impl Piece {
+    const NUMBERS: usize = 5;
+
+    fn at(&self, after: f64) -> f64 {
+        self.coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * after + coefficient)
+    }
+
+    fn slope(&self, after: f64) -> f64 {
+        let [_, b, c, d] = self.coefficients;
+        b + after * (2.0 * c + after * 3.0 * d)
+    }
+}
+
+/// The past of one signal.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct History {
+    pieces: VecDeque<Piece>,
+}
+
+impl History {
+    /// Whether nothing is remembered.
+    pub fn is_empty(&self) -> bool {
+        self.pieces.is_empty()
+    }
+
+    /// Starts a past in which the signal has always had this value, where there is no past yet.
+    pub fn begin(&mut self, time: f64, value: f64) {
+        if self.pieces.is_empty() {
+            // A second before anything that follows.
+            self.pieces.push_back(Piece { start: time - 1.0, coefficients: [value, 0.0, 0.0, 0.0] });
+        }
+    }
+
+    /// Adds a straight line; one that only goes on as the last did adds nothing.
+    pub fn push_line(&mut self, line: &Line) {
+        let goes_on = self.pieces.back().is_some_and(|last| {
+            let expected = last.at(line.start - last.start);
+            let rounding = 1e-14 * (expected.abs() + (last.coefficients[1] * (line.start - last.start)).abs());
+            last.coefficients[1] == line.slope
+                && last.coefficients[2..] == [0.0; 2]
+                && (expected - line.value).abs() <= rounding
+        });
+        if !goes_on {
+            self.push(Piece { start: line.start, coefficients: [line.value, line.slope, 0.0, 0.0] });
+        }
+    }
+
+    /// Adds the cubic between two instants with their values and rates (Hermite).
+    pub fn push_cubic(&mut self, [start, end]: [f64; 2], [x0, x1]: [f64; 2], [v0, v1]: [f64; 2]) {
+        let span = end - start;
+        if span <= 0.0 {
+            return;
+        }
+        let mean = (x1 - x0) / span;
+        let coefficients = [x0, v0, (3.0 * mean - 2.0 * v0 - v1) / span, (v0 + v1 - 2.0 * mean) / (span * span)];
+        self.push(Piece { start, coefficients });
+    }
+
+    fn push(&mut self, piece: Piece) {
+        self.drop_since(piece.start);
+        self.pieces.push_back(piece);
+    }
+
+    /// Drops the pieces that start at a time or later.
+    fn drop_since(&mut self, time: f64) {
+        while self.pieces.back().is_some_and(|last| last.start >= time) {
+            self.pieces.pop_back();
+        }
+    }
+
+    /// Drops what ends before a time.
+    pub fn drop_before(&mut self, time: f64) {
+        while self.pieces.get(1).is_some_and(|second| second.start <= time) {
+            self.pieces.pop_front();
+        }
+    }
+
+    /// Value and slope at a time, and how long the piece there still lasts, s (infinite for the last one); zeros where
+    /// nothing is remembered.
+    pub fn look_up(&self, time: f64) -> (f64, f64, f64) {
+        let next = self.pieces.partition_point(|piece| piece.start <= time + SAME_INSTANT);
+        let lasts = self.pieces.get(next).map_or(f64::INFINITY, |piece| piece.start - time);
+        self.pieces.get(next.saturating_sub(1)).map_or((0.0, 0.0, lasts), |piece| {
+            let after = (time - piece.start).max(0.0);
+            (piece.at(after), piece.slope(after), lasts)
+        })
+    }
+
+    fn save(&self, saved: &mut Vec<f64>) {
+        saved.push(self.pieces.len() as f64);
+        for piece in &self.pieces {
+            saved.push(piece.start);
+            saved.extend(piece.coefficients);
+        }
+    }
+
+    /// Reads what was saved from the front of a slice; gives what follows.
+    fn load(saved: &[f64]) -> Option<(Self, &[f64])> {
+        let (count, rest) = saved.split_first()?;
+        let possible = count.fract() == 0.0 && (0.0..=(rest.len() / Piece::NUMBERS) as f64).contains(count);
+        let (numbers, rest) =
+            rest.split_at_checked(if possible { *count as usize * Piece::NUMBERS } else { usize::MAX })?;
+        let (pieces, _) = numbers.as_chunks::<{ Piece::NUMBERS }>();
+        let pieces: VecDeque<_> =
+            pieces.iter().map(|&[start, a, b, c, d]| Piece { start, coefficients: [a, b, c, d] }).collect();
+        let in_order = pieces.iter().zip(pieces.iter().skip(1)).all(|(one, next)| one.start < next.start);
+        in_order.then_some((Self { pieces }, rest))
+    }
+
+    fn shift(&mut self, span: f64) {
+        self.pieces.iter_mut().for_each(|piece| piece.start += span);
+    }
+}
+
+/// How the pilot stage of a valve fails to follow its command; zeros where it does follow.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Slack {
+    /// Half width of the play, V.
+    pub play: f64,
+    /// Deviation at which a stuck pilot jumps to the command, V.
+    pub stiction: f64,
+    /// Where in its play the pilot starts, as a share of the half width.
+    pub start: f64,
+}
+
+impl Slack {
+    /// Whether the pilot just follows.
+    pub fn is_none(&self) -> bool {
+        self.play == 0.0 && self.stiction == 0.0
+    }
+}
+
+/// Where the pilot is: behind its play, and behind its stiction, V.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pilot {
+    behind_play: f64,
+    stuck_at: f64,
+}
+
+impl Pilot {
+    fn at_rest(slack: &Slack, command: f64) -> Self {
+        let position = command + slack.play * slack.start;
+        Self { behind_play: position, stuck_at: position }
+    }
+
+    /// Follows a line of the command, and tells the lines that come of it.
+    fn follow(&mut self, slack: &Slack, line: Line, mut tell: impl FnMut(Line)) {
+        let Self { behind_play, stuck_at } = self;
+        follow_with_play(behind_play, slack.play, line, |line| {
+            if slack.stiction > 0.0 {
+                follow_with_stiction(stuck_at, slack.stiction, line, &mut tell);
+            } else {
+                tell(line);
+            }
+        });
+    }
+}
+
+/// Play: the position moves only where the line pushes it.
+fn follow_with_play(position: &mut f64, half_width: f64, line: Line, mut tell: impl FnMut(Line)) {
+    // Not `clamp`, which panics where a derivative tries a width below zero.
+    *position = position.max(line.value - half_width).min(line.value + half_width);
+    let direction = if line.slope < 0.0 { -1.0 } else { 1.0 };
+    // Until the pushing flank has come to the position.
+    let gap = direction * (*position - line.value) + half_width;
+    let rest = if line.slope == 0.0 { f64::INFINITY } else { gap / line.slope.abs() };
+    if rest > SAME_INSTANT {
+        tell(Line { span: line.span.min(rest), value: *position, slope: 0.0, ..line });
+    }
+    if rest < line.span - SAME_INSTANT {
+        let pushed = line.from(if rest > SAME_INSTANT { rest } else { 0.0 });
+        tell(Line { value: pushed.value - direction * half_width, ..pushed });
+        *position = line.at(line.span) - direction * half_width;
+    }
+}
+
+/// Stiction: the position stays until it is off by the threshold, and jumps to the line then.
+fn follow_with_stiction(position: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
+    if (line.value - *position).abs() >= threshold {
+        *position = line.value;
+    }
+    let speed = line.slope.abs();
+    let direction = line.slope.signum();
+    let first = if speed == 0.0 { f64::INFINITY } else { (threshold - direction * (line.value - *position)) / speed };
+    if first >= line.span {
+        return tell(Line { value: *position, slope: 0.0, ..line });
+    }
+    tell(Line { span: first, value: *position, slope: 0.0, ..line });
+    let (moving, stair) = (line.from(first), threshold / speed);
+    let jumps = (moving.span / stair).floor();
+    let landed = |jump: f64| moving.at(jump * stair);
+    if stair < FINEST_STAIR {
+        tell(Line { value: moving.value - direction * 0.5 * threshold, ..moving });
+    } else {
+        for jump in 0..=jumps as u32 {
+            let after = f64::from(jump) * stair;
+            let span = stair.min(moving.span - after);
+            tell(Line { start: moving.start + after, span, value: landed(f64::from(jump)), slope: 0.0 });
+        }
+    }
+    *position = landed(jumps);
+}
+
+/// What a muscle with its valve remembers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PlantMemory {
+    pilot: Option<Pilot>,
+    /// Command behind the pilot, as old as the dead time and one step.
+    command: History,
+    /// Contraction, as old as the delay of its sensor.
+    contraction: History,
+}
+
+impl PlantMemory {
+    /// Whether nothing is remembered.
+    pub fn is_empty(&self) -> bool {
+        self.pilot.is_none() && self.command.is_empty() && self.contraction.is_empty()
+    }
+
+    /// Takes note of the command of the coming step, which the valve will see after a delay in s.
+    pub fn expect_command(&mut self, slack: &Slack, delay: f64, line: Line) {
+        if slack.is_none() {
+            self.pilot = None;
+        }
+        if delay == 0.0 {
+            self.command.pieces.clear();
+        }
+        if slack.is_none() && delay == 0.0 {
+            return;
+        }
+        let mut pilot = self.pilot.unwrap_or_else(|| Pilot::at_rest(slack, line.value));
+        self.command.begin(line.start, pilot.stuck_at);
+        pilot.follow(slack, line, |line| self.command.push_line(&line));
+        self.pilot = (!slack.is_none()).then_some(pilot);
+    }
+
+    /// Command that the valve sees at a time in s: value, slope, and how long that holds; `None` where it sees the
+    /// command itself.
+    pub fn seen_command(&self, time: f64) -> Option<(f64, f64, f64)> {
+        (!self.command.is_empty()).then(|| self.command.look_up(time))
+    }
+
+    /// The past of the contraction, for sensors that show it late.
+    pub fn contraction(&mut self) -> &mut History {
+        &mut self.contraction
+    }
+
+    /// Contraction in m at a time in s; `None` where it is not remembered.
+    pub fn contraction_at(&self, time: f64) -> Option<f64> {
+        (!self.contraction.is_empty()).then(|| self.contraction.look_up(time).0)
+    }
+
+    /// Forgets what no delay reaches any more.
+    pub fn forget(&mut self, command_before: f64, contraction_before: f64) {
+        self.command.drop_before(command_before);
+        self.contraction.drop_before(contraction_before);
+    }
+}
+
+/// Time and pilot when a step began.
+#[derive(Debug, Clone, Copy)]
+pub struct PlantMark {
+    time: f64,
+    pilot: Option<Pilot>,
+}
+
+impl Memory for PlantMemory {
+    type Mark = PlantMark;
+
+    fn mark(&self, time: f64) -> PlantMark {
+        PlantMark { time, pilot: self.pilot }
+    }
+
+    fn roll_back(&mut self, mark: PlantMark) {
+        // What a step adds starts when it does or later, and what was there before started earlier.
+        self.command.drop_since(mark.time);
+        self.contraction.drop_since(mark.time);
+        self.pilot = mark.pilot;
+    }
+
+    fn shift(&mut self, span: f64) {
+        self.command.shift(span);
+        self.contraction.shift(span);
+    }
+
+    fn save(&self, saved: &mut Vec<f64>) {
+        let pilot = self.pilot.map(|pilot| [pilot.behind_play, pilot.stuck_at]);
+        saved.push(f64::from(u8::from(pilot.is_some())));
+        saved.extend(pilot.into_iter().flatten());
+        self.command.save(saved);
+        self.contraction.save(saved);
+    }
+
+    fn load(saved: &[f64]) -> Option<Self> {
+        let (pilot, rest) = match saved {
+            [0.0, rest @ ..] => (None, rest),
+            [1.0, behind_play, stuck_at, rest @ ..] => {
+                (Some(Pilot { behind_play: *behind_play, stuck_at: *stuck_at }), rest)
+            }
+            _ => return None,
+        };
+        let (command, rest) = History::load(rest)?;
+        let (contraction, rest) = History::load(rest)?;
+        rest.is_empty().then_some(Self { pilot, command, contraction })
+    }
+}
