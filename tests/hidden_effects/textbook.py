@@ -14,6 +14,7 @@ from effects import (
     ForceSensorGain,
     Form,
     HeavierLoad,
+    Play,
     PositionDelay,
     PositionGain,
     PositionOffset,
@@ -25,7 +26,7 @@ from effects import (
     WeakSupply,
     either_sign,
 )
-from plant import STEP, elastic_force
+from plant import STEP, area, elastic_force
 
 
 class Dahl(Rubbing):
@@ -93,6 +94,39 @@ class ConstantEnds(Form):
         now.strain[self.at] += self.more * now.x[self.at]
 
 
+class ExponentialThreshold(Form):
+    """Pressure lost, fading exponentially; never more than there is."""
+
+    @staticmethod
+    def sizes(random, severity):
+        return {"lost": severity * random.uniform(0.4e5, 1.0e5), "fade": random.uniform(0.5e5, 1.2e5)}
+
+    def act(self, now):
+        p = np.maximum(now.p[self.at], 0)
+        lost = np.minimum(self.lost * np.exp(-p / self.fade), p)
+        now.force[self.at] -= lost * now.area_factor[self.at] * area(now.strain[self.at])
+
+
+class WarmArea(WarmUp):
+    """The area grows or shrinks as 1 - exp(-t/tau)."""
+
+    def act(self, now):
+        warm = self.change * (1 - np.exp(-max(now.time, 0.0) / self.duration))
+        pull = now.p[self.at] * now.area_factor[self.at] * area(now.strain[self.at])
+        now.force[self.at] += warm * pull
+
+
+class LinearCable(Form):
+    """What the position sensor shows stretches with the pull."""
+
+    @staticmethod
+    def sizes(random, severity):
+        return {"compliance": -severity * random.uniform(3e-6, 1e-5)}
+
+    def show(self, time, p, x, force):
+        return p, x + self.compliance * force, force
+
+
 class LongerTimeConstant(Form):
     """First order, slower."""
 
@@ -144,6 +178,19 @@ class SharpCeiling(WeakSupply):
         now.target[self.at] = np.minimum(now.target[self.at], self.ceiling)
 
 
+class SharpRateLimit(Form):
+    """Filling and emptying are cut off at a rate."""
+
+    @staticmethod
+    def sizes(random, severity):
+        rate = random.uniform(0.6e5, 2.0e5) / severity
+        return {"filling": rate, "emptying": rate / random.uniform(1.2, 2.5)}
+
+    def valve(self, now, before):
+        change = now.p[self.at] - before[self.at]
+        now.p[self.at] = before[self.at] + np.clip(change, -STEP * self.emptying, STEP * self.filling)
+
+
 class LaminarLeak(Form):
     """A loss in proportion to gauge pressure; together with the valve first order again, and exact."""
 
@@ -157,44 +204,44 @@ class LaminarLeak(Form):
         now.time_constant[self.at] /= loss
 
 
-def size_of(name, plus=0.0):
-    return lambda size: size[name] + plus
-
-
-# Per effect its form, and the true values of the tool's parameters.
+# Per effect its form, and which of its sizes the parameters of the tool are.
 SAME_FORM = {
     "friction_hysteresis": (
         Dahl,
         {
-            "half_width": size_of("constant"),
-            "half_width_per_pressure": size_of("per_pressure"),
-            "presliding_displacement": size_of("bend"),
+            "half_width": "constant",
+            "half_width_per_pressure": "per_pressure",
+            "presliding_displacement": "bend",
         },
     ),
-    "viscous_damping": (LinearDamping, {"contraction": size_of("up"), "extension": size_of("down")}),
-    "creep": (OneStepCreep, {"amount": size_of("amount"), "time_constant": size_of("time")}),
-    "bladder_stiffness": (ScaledBladder, {"factor": size_of("more", 1)}),
-    "force_gain": (ForceGain, {"factor": size_of("more", 1)}),
-    "end_effects": (ConstantEnds, {"factor": size_of("more", 1)}),
-    "payload_mass": (HeavierLoad, {"additional_mass": size_of("additional")}),
-    "valve_lag": (LongerTimeConstant, {"time_constant": size_of("time")}),
-    "valve_resonance": (LinearRinging, {"frequency": size_of("frequency"), "damping_ratio": size_of("ratio")}),
-    "valve_dead_time": (DeadTime, {"delay": size_of("delay")}),
-    "valve_gain": (StraightGain, {"factor": size_of("more", 1)}),
-    "valve_offset": (ValveOffset, {"offset": size_of("volts")}),
-    "supply_saturation": (SharpCeiling, {"ceiling": size_of("ceiling")}),
-    "leakage": (LaminarLeak, {"rate": size_of("rate")}),
-    "contraction_sensor_offset": (PositionOffset, {"offset": size_of("off")}),
-    "contraction_sensor_gain": (PositionGain, {"factor": size_of("more", 1)}),
-    "contraction_sensor_delay": (PositionDelay, {"delay": size_of("delay")}),
-    "pressure_sensor_offset": (PressureOffset, {"offset": size_of("off")}),
-    "pressure_sensor_gain": (PressureGain, {"factor": size_of("more", 1)}),
-    "force_sensor_offset": (ForceOffset, {"offset": size_of("off")}),
-    "force_sensor_gain": (ForceSensorGain, {"factor": size_of("more", 1)}),
-    "temperature_drift": (WarmUp, {"change": size_of("change"), "time_constant": size_of("duration")}),
+    "viscous_damping": (LinearDamping, {"contraction": "up", "extension": "down"}),
+    "creep": (OneStepCreep, {"amplitude_1": "amount", "time_1": "time"}),
+    "threshold_pressure": (ExponentialThreshold, {"lost": "lost", "fade": "fade"}),
+    "bladder_stiffness": (ScaledBladder, {"relative_change": "more"}),
+    "force_gain": (ForceGain, {"relative_error": "more"}),
+    "end_effects": (ConstantEnds, {"excess": "more"}),
+    "series_elasticity": (LinearCable, {"compliance": "compliance"}),
+    "payload_mass": (HeavierLoad, {"additional_mass": "additional"}),
+    "valve_lag": (LongerTimeConstant, {"time_constant": "time"}),
+    "valve_resonance": (LinearRinging, {"natural_frequency": "frequency", "damping_ratio": "ratio"}),
+    "valve_dead_time": (DeadTime, {"delay": "delay"}),
+    "valve_dead_band": (Play, {"play": "half"}),
+    "valve_gain": (StraightGain, {"relative_error": "more"}),
+    "valve_offset": (ValveOffset, {"offset": "volts"}),
+    "supply_saturation": (SharpCeiling, {"gauge_pressure": "ceiling"}),
+    "flow_limit": (SharpRateLimit, {"filling": "filling", "emptying": "emptying"}),
+    "leakage": (LaminarLeak, {"rate": "rate"}),
+    "contraction_sensor_offset": (PositionOffset, {"offset": "off"}),
+    "contraction_sensor_gain": (PositionGain, {"relative_error": "more"}),
+    "contraction_sensor_delay": (PositionDelay, {"delay": "delay"}),
+    "pressure_sensor_offset": (PressureOffset, {"offset": "off"}),
+    "pressure_sensor_gain": (PressureGain, {"relative_error": "more"}),
+    "force_sensor_offset": (ForceOffset, {"offset": "off"}),
+    "force_sensor_gain": (ForceSensorGain, {"relative_error": "more"}),
+    "temperature_drift": (WarmArea, {"area_change": "change", "time_constant": "duration"}),
 }
 
 
 def true_parameters(effect, size):
     """By their full names in the tool."""
-    return {f"{effect}.{name}": float(value(size)) for name, value in SAME_FORM[effect][1].items()}
+    return {f"{effect}.{name}": float(size[own]) for name, own in SAME_FORM[effect][1].items()}
