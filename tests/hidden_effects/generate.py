@@ -501,10 +501,11 @@ def main():
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--severity", type=float, default=1.0, help="size of the effects: 1 full, 0.333 one third")
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--same-form", action="store_true", help="in the forms that the fit itself uses")
     add_options(parser)
     options = parser.parse_args()
     truths = wanted_truths(options.effects, options.cases, options.seed)
-    write_cases(truths, options.severity, options.seed, options.out, options.jobs)
+    write_cases(truths, options.severity, options.seed, options.out, options.jobs, same_form=options.same_form)
 
 
 if __name__ == "__main__":
