@@ -2,13 +2,15 @@
 
 A form has `sizes(random, severity)` (its parameters for one case) and hooks that act on its columns `at`:
 `drive` on the commands before the run, `stretch` on the contraction as the muscle feels it, `act` on force and damping,
-`valve` on the pressure, `show` on what the sensors give. Ranges are those known from practice; see README.md.
+`aim` on the target and the time constant of the valve, `valve` on the pressure, `show` on what the sensors give. Forms
+of several effects work on the same columns where a case hides more than one. Ranges are those known from practice; see
+README.md.
 """
 
 import numpy as np
 from scipy.signal import lfilter
 
-from plant import GRAVITY, STEP, VALVE_RATE, area, elastic_force
+from plant import STEP, VALVE_GAIN, area, elastic_force
 
 AMBIENT = 1e5
 
@@ -17,8 +19,21 @@ def either_sign(random, low, high):
     return random.choice([-1, 1]) * random.uniform(low, high)
 
 
+def play(series, half):
+    """Follows a series with play of a half width per column."""
+    out = series.copy()
+    for k in range(1, len(out)):
+        out[k] = np.clip(out[k - 1], series[k] - half, series[k] + half)
+    return out
+
+
 class Form:
     """Its parameters become attributes, each an array with one entry per column."""
+
+    @staticmethod
+    def suited(size, experiments):
+        """The size for the experiments of a case, where it depends on them; the same in all of them."""
+        return size
 
     def __init__(self, at, size):
         self.at = at
@@ -230,8 +245,12 @@ class HeavierLoad(Form):
     def sizes(random, severity):
         return {"share": severity * either_sign(random, 0.05, 0.2)}
 
+    @staticmethod
+    def suited(size, experiments):
+        return {"additional": size["share"] * min(experiment.mass for experiment in experiments)}
+
     def begin(self, now):
-        now.mass[self.at] += self.share * self.lightest
+        now.mass[self.at] += self.additional
 
 
 class WarmUp(Form):
@@ -269,11 +288,8 @@ class SlowerWhenFull(Form):
     def sizes(random, severity):
         return {"time": severity * random.uniform(0.03, 0.12), "growth": random.uniform(-0.3, 0.5)}
 
-    def valve(self, now, before):
-        p = before[self.at]
-        longer = self.time * (1 + self.growth * (p / 2e5 - 1))
-        kept = np.exp(-STEP / (1 / VALVE_RATE + longer))
-        now.p[self.at] = now.target[self.at] + (p - now.target[self.at]) * kept
+    def aim(self, now):
+        now.time_constant[self.at] += self.time * (1 + self.growth * (now.p[self.at] / 2e5 - 1))
 
 
 class Ringing(Form):
@@ -361,17 +377,18 @@ class WeakSupply(Form):
         # At a third of the size the ceiling cuts off a third as much.
         return {"cut": severity * random.uniform(0.2, 0.45), "droop": random.uniform(0.0, 0.02)}
 
-    def drive(self, command):
-        top, low = command.max(axis=0), command.min(axis=0)
-        self.ceiling = 1e5 * (top - self.cut * (top - low))
-        return command
+    @staticmethod
+    def suited(size, experiments):
+        """One supply for all recordings: the share is cut off from that which goes highest."""
+        command = max((experiment.command for experiment in experiments), key=np.max)
+        ceiling = VALVE_GAIN * (command.max() - size["cut"] * np.ptp(command))
+        return {**size, "ceiling": ceiling}
 
-    def valve(self, now, before):
-        target, p = now.target[self.at], before[self.at]
-        droop = self.droop * np.maximum(target - p, 0)
+    def aim(self, now):
+        target = now.target[self.at]
+        droop = self.droop * np.maximum(target - now.p[self.at], 0)
         soft = 2e3
-        capped = target - soft * np.logaddexp(0, (target - self.ceiling + droop) / soft)
-        now.p[self.at] = capped + (p - capped) * np.exp(-VALVE_RATE * STEP)
+        now.target[self.at] = target - soft * np.logaddexp(0, (target - self.ceiling + droop) / soft)
 
 
 class ChokedFlow(Form):
@@ -383,7 +400,7 @@ class ChokedFlow(Form):
         return {"filling": rate, "emptying": rate / random.uniform(1.2, 2.5)}
 
     def valve(self, now, before):
-        wanted = VALVE_RATE * (now.target[self.at] - before[self.at])
+        wanted = (now.target[self.at] - before[self.at]) / now.time_constant[self.at]
         most = np.where(wanted > 0, self.filling, self.emptying)
         now.p[self.at] = before[self.at] + STEP * wanted / np.sqrt(1 + (wanted / most) ** 2)
 
@@ -470,119 +487,6 @@ class ForceSensorGain(Form):
         return p, x, force * (1 + self.more)
 
 
-# --- In no library ----------------------------------------------------------------------------------------------------
-
-
-def play(series, half):
-    """Follows a series with play of a half width per column."""
-    out = series.copy()
-    for k in range(1, len(out)):
-        out[k] = np.clip(out[k - 1], series[k] - half, series[k] + half)
-    return out
-
-
-class LooseBracket(Form):
-    """The position sensor's bracket gives way, the more the higher the pull."""
-
-    @staticmethod
-    def sizes(random, severity):
-        return {"half": severity * random.uniform(1.5e-3, 5e-3)}
-
-    def show(self, time, p, x, force):
-        followed = play(x / self.half, np.ones(len(self.half)))
-        slack = x / self.half - followed
-        return p, x - self.half * slack * np.clip(force / 400, 0, 1.5), force
-
-
-class GuideSpot(Form):
-    """A rough spot on the guide rail."""
-
-    @staticmethod
-    def sizes(random, severity):
-        place = {"where": random.uniform(0.08, 0.14), "width": random.uniform(0.006, 0.012)}
-        return {"grip": severity * random.uniform(60, 150), **place}
-
-    def act(self, now):
-        x, v = now.x[self.at], now.v[self.at]
-        bump = np.exp(-(((x - self.where) / self.width) ** 2))
-        now.force[self.at] -= self.grip * bump * np.tanh(v / 5e-3)
-
-
-class MainsHum(Form):
-    """Hum on the force sensor, modulated; sampling folds it to any frequency."""
-
-    @staticmethod
-    def sizes(random, severity):
-        return {"newton": severity * random.uniform(8, 30), "modulation": random.uniform(0.05, 0.4)}
-
-    def show(self, time, p, x, force):
-        t = time[:, None]
-        hum = np.sin(2 * np.pi * 49.97 * t) * (1 + 0.8 * np.sin(2 * np.pi * self.modulation * t))
-        return p, x, force + self.newton * hum
-
-
-class RubberStop(Form):
-    """Something elastic takes part of the load from some contraction on."""
-
-    @staticmethod
-    def sizes(random, severity):
-        return {"stiffness": severity * random.uniform(1500, 4000), "where": random.uniform(0.08, 0.12)}
-
-    def act(self, now):
-        x = now.x[self.at]
-        now.external[self.at] = -self.stiffness * np.maximum(x - self.where, 0) ** 1.3 / 0.05**0.3
-
-
-class CoarseConverter(Form):
-    """The converter behind the recorded command has few bits."""
-
-    @staticmethod
-    def sizes(random, severity):
-        return {"volts": severity * random.uniform(0.1, 0.3)}
-
-    def drive(self, command):
-        return self.volts * np.floor(command / self.volts)
-
-
-class Pendulum(Form):
-    """The load swings: its pull varies at twice the frequency of the swing."""
-
-    @staticmethod
-    def sizes(random, severity):
-        swing = {"angle": np.sqrt(severity) * random.uniform(0.25, 0.45), "frequency": random.uniform(0.35, 0.7)}
-        return {**swing, "decay": random.uniform(20, 60)}
-
-    def act(self, now):
-        t = max(now.time, 0.0)
-        angle = self.angle * np.exp(-t / self.decay)
-        swing = angle**2 * (0.25 - 0.75 * np.cos(4 * np.pi * self.frequency * t))
-        now.external[self.at] = -now.mass[self.at] * GRAVITY * swing * (now.time > 0)
-
-
-class BreathingFrame(Form):
-    """The frame of the position sensor warms and cools with the room's ventilation."""
-
-    @staticmethod
-    def sizes(random, severity):
-        return {"metre": severity * random.uniform(1.5e-3, 5e-3), "period": random.uniform(9, 20)}
-
-    def show(self, time, p, x, force):
-        phase = 2 * np.pi * time[:, None] / self.period
-        return p, x + self.metre * (np.sin(phase) + 0.3 * np.sin(2 * phase + 1)), force
-
-
-class CompressorCycle(Form):
-    """The valve lets part of the supply's saw-tooth through."""
-
-    @staticmethod
-    def sizes(random, severity):
-        return {"share": severity * random.uniform(0.03, 0.08), "period": random.uniform(2.5, 7)}
-
-    def drive(self, command):
-        cycle = (STEP * np.arange(len(command))[:, None] / self.period) % 1
-        return command * (1 + self.share * (np.where(cycle < 0.2, 5 * cycle, 1.25 * (1 - cycle)) - 0.5))
-
-
 KNOWN = {
     "friction_hysteresis": [MaxwellSlip, LuGre, BoucWen],
     "viscous_damping": [PowerDamping],
@@ -610,15 +514,4 @@ KNOWN = {
     "force_sensor_offset": [ForceOffset],
     "force_sensor_gain": [ForceSensorGain],
     "temperature_drift": [WarmUp],
-}
-
-UNKNOWN = {
-    "unknown_loose_bracket": [LooseBracket],
-    "unknown_guide_spot": [GuideSpot],
-    "unknown_mains_hum": [MainsHum],
-    "unknown_rubber_stop": [RubberStop],
-    "unknown_coarse_converter": [CoarseConverter],
-    "unknown_pendulum": [Pendulum],
-    "unknown_breathing_frame": [BreathingFrame],
-    "unknown_compressor_cycle": [CompressorCycle],
 }

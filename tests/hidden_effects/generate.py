@@ -1,11 +1,17 @@
-"""Recordings with an effect hidden in them, drawn from a seed; the truth goes to a place of its own.
+"""Recordings with effects hidden in them, drawn from a seed; the truth goes to a place of its own.
 
     python generate.py --seed 1 --cases 5 --out hidden      # 5 cases of every effect in hidden/cases, hidden/truths
+
+A truth is `none`, the name of an effect, or two names with a plus between them. Every case has random numbers of its
+own, from the seed and its number: what else is drawn beside it, and by how many processes, does not matter.
 """
 
 import argparse
 import json
-from dataclasses import dataclass, field
+import os
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,21 +20,27 @@ from scipy.ndimage import uniform_filter1d
 from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
-from effects import KNOWN, UNKNOWN
+from effects import KNOWN
+from pairs import NEEDS_COLUMN_IN_PAIR, PAIRS
 from plant import STEP, VALVE_GAIN, Experiment, Specimen, holding_pressure, simulate
+from textbook import SAME_FORM, true_parameters
+from unknown import UNKNOWN
 
-FORMS = {"none": [None], **KNOWN, **UNKNOWN}
+FORMS = {**KNOWN, **UNKNOWN}
 DRIVEN_SHARE = 0.25
 TOLERANCE = 0.03  # of the preset's coefficients, that of the tool by default
 MOST_DRAWS = 20
 CONTRACTION = (0.045, 0.165)  # m, of commands at rest; overshoot takes some more
 COMMAND_STEP = 0.00025  # V, of the logger
 ALLOWED = (0.015, 0.225)  # m, of everything that happens
+CASES_PER_BLOCK = 60  # made by one process at a time; larger ones take memory, smaller ones time
 
 # What must be there for an effect to show at all.
 HANGING_ONLY = {
     "payload_mass", "series_elasticity", "contraction_sensor_gain", "contraction_sensor_delay", "unknown_rubber_stop",
     "unknown_pendulum", "unknown_guide_spot", "unknown_loose_bracket", "unknown_breathing_frame",
+    "unknown_trembling_frame", "unknown_kinked_hose", "unknown_side_wall", "unknown_slipping_wheel",
+    "unknown_eccentric_pulley", "unknown_cross_talk", "unknown_drifting_clock",
 }  # fmt: skip
 NEEDS_COLUMN = {
     "pressure_sensor_offset": "gauge_pressure",
@@ -36,11 +48,13 @@ NEEDS_COLUMN = {
     "force_sensor_offset": "force",
     "force_sensor_gain": "force",
     "unknown_mains_hum": "force",
+    "unknown_cross_talk": "force",
+    "unknown_wandering_zero": "force",
 }
 OF_VALVE = {
     "valve_lag", "valve_resonance", "valve_dead_time", "valve_dead_band", "valve_gain", "valve_offset",
     "supply_saturation", "flow_limit", "leakage", "unknown_coarse_converter", "unknown_compressor_cycle",
-    "pressure_sensor_offset", "pressure_sensor_gain",
+    "unknown_hunting_valve", "pressure_sensor_offset", "pressure_sensor_gain",
 }  # fmt: skip
 
 
@@ -60,14 +74,14 @@ class Plan:
 class Case:
     """What is hidden, and the recordings that hide it."""
 
-    truth: str
+    effects: tuple
     severity: float
-    size: dict
-    form: str
+    hidden: tuple
     specimen: Specimen
     noise: dict
+    same_form: bool = False
     plans: list = field(default_factory=list)
-    visibility: float = 0.0
+    visibility: float | None = None
 
 
 # --- Commands ---------------------------------------------------------------------------------------------------------
@@ -150,10 +164,11 @@ def imposed_motion(random, duration):
 # --- Cases ------------------------------------------------------------------------------------------------------------
 
 
-def draw_specimen(random):
-    """Within 2 % of the preset, its area up to 0.15 % off a straight line."""
+def draw_specimen(random, same_form):
+    """Within 2 % of the preset, its area up to 0.15 % off a straight line, unless the fit is to hold the truth."""
     factors = random.uniform(0.98, 1.02, 3)
-    return Specimen(*factors, ripple=random.uniform(0, 0.0015), ripple_phase=random.uniform(0, 2 * np.pi))
+    ripple, phase = random.uniform(0, 0.0015), random.uniform(0, 2 * np.pi)
+    return Specimen(*factors, ripple=0.0 if same_form else ripple, ripple_phase=phase)
 
 
 def draw_noise(random):
@@ -171,54 +186,68 @@ def draw_noise(random):
     return drawn
 
 
-def draw_columns(random, truth, driven):
-    """Which sensors were logged; never without the one that the effect is about."""
+def needed_columns(effects):
+    tables = [NEEDS_COLUMN, NEEDS_COLUMN_IN_PAIR] if len(effects) > 1 else [NEEDS_COLUMN]
+    return {table[effect] for table in tables for effect in effects if effect in table}
+
+
+def draw_columns(random, effects, driven):
+    """Which sensors were logged; never without those that the effects are about."""
     if driven:
         choices = [("gauge_pressure", "force", "command")] * 3 + [("force", "command")]
-        if truth not in OF_VALVE:
+        if not OF_VALVE & set(effects):
             choices.append(("gauge_pressure", "force"))
         choices = [("contraction", *columns) for columns in choices]
     else:
         choices = [("gauge_pressure", "force")] * 3 + [("gauge_pressure",), ("force",), ()]
         choices = [("command", "contraction", *columns) for columns in choices]
-    needed = NEEDS_COLUMN.get(truth)
-    choices = [columns for columns in choices if needed is None or needed in columns]
+    choices = [columns for columns in choices if needed_columns(effects) <= set(columns)]
     return choices[random.integers(len(choices))]
 
 
-def draw_mass(random, truth):
-    heaviest = 25 if truth == "threshold_pressure" else 80  # a threshold shows at low pressure only
+def draw_mass(random, effects):
+    heaviest = 25 if "threshold_pressure" in effects else 80  # a threshold shows at low pressure only
     return float(np.round(np.exp(random.uniform(np.log(10), np.log(heaviest))), 1))
 
 
-def draw_case(random, truth, severity):
-    forms = FORMS[truth]
-    form = forms[random.integers(len(forms))]
-    driven = truth not in HANGING_ONLY and random.random() < DRIVEN_SHARE
-    columns = draw_columns(random, truth, driven)
-    masses = [None if driven else draw_mass(random, truth) for _ in range(random.integers(1, 4))]
-    size = form.sizes(random, severity) if form else {}
-    if truth == "payload_mass":
-        size["lightest"] = min(masses)
-    case = Case(truth, severity, size, getattr(form, "__name__", "none"), draw_specimen(random), draw_noise(random))
+def draw_hidden(random, effects, severity, same_form):
+    """Pairs of form and size."""
+    hidden = []
+    for effect in effects:
+        forms = SAME_FORM[effect][:1] if same_form else FORMS[effect]
+        form = forms[random.integers(len(forms))]
+        hidden.append((form, form.sizes(random, severity)))
+    return hidden
+
+
+def draw_case(random, truth, severity, same_form):
+    effects = () if truth == "none" else tuple(truth.split("+"))
+    driven = not HANGING_ONLY & set(effects) and random.random() < DRIVEN_SHARE
+    columns = draw_columns(random, effects, driven)
+    masses = [None if driven else draw_mass(random, effects) for _ in range(random.integers(1, 4))]
+    hidden = draw_hidden(random, effects, severity, same_form)
+    specimen, noise = draw_specimen(random, same_form), draw_noise(random)
     rate, jitter = random.choice([50, 80, 100, 125, 200]), random.choice([0.0, random.uniform(0.02, 0.2)])
-    relaxed = bool(random.random() < 0.5)
-    for mass in masses:
-        excitation = random.choice(list(EXCITATIONS))
-        duration = random.uniform(22, 38)
-        experiment = draw_experiment(random, case, form, mass, excitation, duration, relaxed)
-        case.plans.append(Plan(experiment, mass, columns, str(excitation), float(rate), float(jitter)))
+    relaxed = bool(random.random() < 0.5) or same_form
+    excitations = [random.choice(list(EXCITATIONS)) for _ in masses]
+    bare = [draw_experiment(random, mass, kind) for mass, kind in zip(masses, excitations, strict=True)]
+    hidden = tuple((form, form.suited(size, bare)) for form, size in hidden)
+    case = Case(effects, severity, hidden, specimen, noise, same_form)
+    for experiment, kind in zip(bare, excitations, strict=True):
+        full = replace(experiment, specimen=specimen, hidden=hidden, relaxed=relaxed)
+        case.plans.append(Plan(full, experiment.mass, columns, str(kind), float(rate), float(jitter)))
     return case
 
 
-def draw_experiment(random, case, form, mass, excitation, duration, relaxed):
-    common = {"specimen": case.specimen, "form": form, "size": case.size, "relaxed": relaxed}
+def draw_experiment(random, mass, excitation):
+    """Without specimen and effects, as yet."""
+    duration = random.uniform(22, 38)
     if mass is None:
         low, high = random.uniform(0.8, 1.5), random.uniform(2.5, 4.5)
         command = low + (high - low) * course(random, excitation, duration)
-        return Experiment(command=command, motion=imposed_motion(random, duration), **common)
+        return Experiment(Specimen(), command, motion=imposed_motion(random, duration))
     command = hanging_command(random, excitation, duration, mass, random.uniform(0.6, 1.0))
-    return Experiment(command=command, mass=mass, **common)
+    return Experiment(Specimen(), command, mass)
 
 
 # --- Sensors and files ------------------------------------------------------------------------------------------------
@@ -266,19 +295,20 @@ def true_signals(course_run, times):
 
 
 def recorded(random, case, plan, run):
-    """Columns as the logger has them."""
+    """Columns as the logger has them, and by how much each measured one is off what ideal sensors show."""
     times = sample_times(random, plan, run.time[-1])
     signals = true_signals(run, times)
     grid = STEP * np.arange(len(plan.experiment.command))
-    columns = {"time": times}
+    columns, errors = {"time": times}, {}
     for name in plan.columns:
         if name == "command":
             columns[name] = COMMAND_STEP * np.round(np.interp(times, grid, plan.experiment.command) / COMMAND_STEP)
         else:
             columns[name] = reading(random, signals[name], plan.rate, case.noise[name])
+            errors[name] = columns[name] - signals[name]
     if plan.mass is not None:
         columns["load_mass"] = np.full(len(times), plan.mass)
-    return columns
+    return columns, errors
 
 
 def reference(plan, run, **factors):
@@ -324,16 +354,18 @@ def is_feasible(run):
     return ALLOWED[0] < run.contraction.min() and run.contraction.max() < ALLOWED[1]
 
 
-def make(truths, severity, seed):
-    """Cases with the courses of their recordings; what leaves the feasible range is drawn anew."""
-    random = np.random.default_rng(seed)
-    made = [None] * len(truths)
+def make(numbered, severity, seed, same_form=False):
+    """Cases for pairs of number and truth, with the courses of their recordings, in the order given.
+
+    What leaves the feasible range is drawn anew.
+    """
+    randoms = [np.random.default_rng([seed, number]) for number, _ in numbered]
+    made = [None] * len(numbered)
     for _ in range(MOST_DRAWS):
         open_cases = [k for k, case in enumerate(made) if case is None]
         if not open_cases:
-            add_visibility(made)
             return made
-        drawn = [draw_case(random, truths[k], severity) for k in open_cases]
+        drawn = [draw_case(randoms[k], numbered[k][1], severity, same_form) for k in open_cases]
         runs = iter(simulate([plan.experiment for case in drawn for plan in case.plans]))
         for k, case in zip(open_cases, drawn, strict=True):
             own = [next(runs) for _ in case.plans]
@@ -346,17 +378,37 @@ def plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
+def parameters_of(case):
+    """True values by the tool's names, where it has such parameters."""
+    if not case.same_form:
+        return {}
+    sizes = zip(case.effects, case.hidden, strict=True)
+    return {name: value for effect, (_, size) in sizes for name, value in true_parameters(effect, size).items()}
+
+
+def noise_rms(errors):
+    """Per column, over all recordings of a case and what was not lost."""
+    together = {name: np.concatenate([own[name] for own in errors]) for name in errors[0]}
+    return {name: float(np.sqrt(np.nanmean(values**2))) for name, values in together.items()}
+
+
 def write_case(random, name, case, runs, out):
     folder = out / "cases" / name
     folder.mkdir(parents=True)
+    errors = []
     for number, (plan, run) in enumerate(zip(case.plans, runs, strict=True), start=1):
-        write_recording(folder / f"run{number}.csv", recorded(random, case, plan, run))
+        columns, own = recorded(random, case, plan, run)
+        write_recording(folder / f"run{number}.csv", columns)
+        errors.append(own)
     truth = {
-        "effect": case.truth,
-        "form": case.form,
+        "effect": "+".join(case.effects) or "none",
+        "effects": case.effects,
         "severity": case.severity,
-        "size": {key: plain(value) for key, value in case.size.items()},
+        "forms": [form.__name__ for form, _ in case.hidden],
+        "sizes": [{key: plain(value) for key, value in size.items()} for _, size in case.hidden],
         "visibility": case.visibility,
+        "same_form": case.same_form,
+        "parameters": parameters_of(case),
         "specimen": vars(case.specimen),
         "relaxed": case.plans[0].experiment.relaxed,
         "recordings": [
@@ -364,31 +416,96 @@ def write_case(random, name, case, runs, out):
             for p in case.plans
         ],
         "noise": case.noise,
+        "noise_rms": noise_rms(errors),
     }
     (out / "truths").mkdir(exist_ok=True)
     (out / "truths" / f"{name}.json").write_text(json.dumps(truth, indent=1, default=plain))
 
 
-def write_cases(truths, severity, seed, out):
-    """Writes cases for a list of truths; gives their names."""
-    random = np.random.default_rng([seed, 1])  # of the sensors, apart from that of the plants
-    names = []
-    for k, (case, runs) in enumerate(make(truths, severity, seed)):
-        names.append(f"case_{k:04d}")
-        write_case(random, names[-1], case, runs, out)
-    return names
+def write_block(numbered, severity, seed, out, visible, same_form):
+    made = make(numbered, severity, seed, same_form)
+    if visible:
+        add_visibility(made)
+    for (number, _), (case, runs) in zip(numbered, made, strict=True):
+        # The sensors have random numbers of their own, apart from those of the plant.
+        write_case(np.random.default_rng([seed, number, 1]), f"case_{number:04d}", case, runs, out)
+
+
+def write_cases(truths, severity, seed, out, jobs=1, visible=True, same_form=False):
+    """Writes cases for a list of truths; gives their names. Without `visible` that costly number is left out."""
+    numbered = sorted(enumerate(truths), key=lambda pair: pair[1])  # like effects side by side: that is faster
+    size = min(CASES_PER_BLOCK, -(-len(numbered) // jobs))
+    blocks = [numbered[start : start + size] for start in range(0, len(numbered), size)]
+    write = partial(write_block, severity=severity, seed=seed, out=Path(out), visible=visible, same_form=same_form)
+    (Path(out) / "cases").mkdir(parents=True, exist_ok=True)
+    if jobs == 1:
+        list(map(write, blocks))
+    else:
+        with ProcessPoolExecutor(jobs) as pool:
+            list(pool.map(write, blocks))
+    return [f"case_{number:04d}" for number in range(len(truths))]
+
+
+# --- What to draw -----------------------------------------------------------------------------------------------------
+
+GROUPS = {"known": list(KNOWN), "unknown": list(UNKNOWN)}
+
+
+def draw_some(seed, count, possible):
+    """That many of the possible ones, none twice before all were there."""
+    random = np.random.default_rng([seed, 2**32 - 1])
+    rounds = [random.permutation(possible) for _ in range(-(-count // len(possible)))] if possible else []
+    return [str(one) for order in rounds for one in order][:count]
+
+
+def wanted_truths(items, cases, seed, known=frozenset(KNOWN)):
+    """Truths for a list as in `none:60,known,valve_lag:3,pairs:40`.
+
+    Those drawn at random come from the effects of `known`, pairs of them, and effects that are in no library.
+    """
+    drawn = {
+        "any-known": [effect for effect in KNOWN if effect in known],
+        "any-unknown": list(UNKNOWN),
+        "pairs": [pair for pair in PAIRS if set(pair.split("+")) <= set(known)],
+    }
+    truths = []
+    for item in items.split(","):
+        name, _, count = item.partition(":")
+        count = int(count or cases)
+        if name in drawn:
+            truths += draw_some(seed, count, drawn[name])
+            continue
+        for effect in GROUPS.get(name, [name]):
+            strange = [part for part in effect.split("+") if part != "none" and part not in FORMS]
+            if strange:
+                names = ", ".join(["none", *drawn, *GROUPS, *FORMS])
+                raise SystemExit(f"there is no effect {strange[0]}; there are {names}")
+            truths += [effect] * count
+    return truths
+
+
+def add_options(parser):
+    """What generator and score have in common."""
+    parser.add_argument("--cases", type=int, default=5, help="of each effect, where no other count is given")
+    parser.add_argument(
+        "--effects",
+        default="known,unknown,none,pairs",
+        help="separated by commas, each with :COUNT: names, ONE+OTHER, none; known and unknown (each of them);"
+        " any-known, any-unknown and pairs (that many drawn at random)",
+    )
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--cases", type=int, default=1, help="of each effect")
-    parser.add_argument("--effects", default=",".join(FORMS), help="separated by commas")
     parser.add_argument("--severity", type=float, default=1.0, help="size of the effects: 1 full, 0.333 one third")
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--same-form", action="store_true", help="in the forms that the fit itself uses")
+    add_options(parser)
     options = parser.parse_args()
-    truths = [effect for effect in options.effects.split(",") for _ in range(options.cases)]
-    write_cases(truths, options.severity, options.seed, options.out)
+    truths = wanted_truths(options.effects, options.cases, options.seed)
+    write_cases(truths, options.severity, options.seed, options.out, options.jobs, same_form=options.same_form)
 
 
 if __name__ == "__main__":

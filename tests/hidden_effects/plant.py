@@ -1,10 +1,10 @@
-"""The true plant: valve, muscle, and a hanging load or an imposed motion, with one effect hidden in it.
+"""The true plant: valve, muscle, and a hanging load or an imposed motion, with effects hidden in it.
 
 Many experiments run side by side as columns of numpy arrays. Mechanics: leapfrog with implicit damping; valve: exact
 for a command held over a step; dry friction and the like: exact in displacement. Nothing is shared with the product.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +14,7 @@ STORE_EVERY = 4  # steps between stored samples; 2 ms resolves everything the pl
 SETTLE = 2.5  # s of rest, strongly damped, before the recording starts
 VALVE_GAIN = 1e5
 VALVE_RATE = 2 * np.pi * 2.5
+KEPT = np.exp(-VALVE_RATE * STEP)  # by the nominal valve over a step
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,7 @@ class Experiment:
     command: np.ndarray
     mass: float | None = None
     motion: np.ndarray | None = None
-    form: type | None = None
-    size: dict = field(default_factory=dict)
+    hidden: tuple = ()  # pairs of the form of an effect and its size
     relaxed: bool = True  # whether friction and creep start without a past
 
 
@@ -81,35 +81,44 @@ class Now:
         self.gain, self.step, self.v = np.ones(count), np.zeros(count), np.zeros(count)
         self.external, self.live = np.zeros(count), np.zeros(count)
         self.p = self.x = self.target = self.strain = self.damping = self.force = None
+        self.time_constant = np.full(count, 1 / VALVE_RATE)
 
     def static_force(self):
         wave = 1 + self.ripple * np.sin(30 * self.strain + self.ripple_phase)
         return self.p * self.area_factor * area(self.strain) * wave + self.elastic_factor * elastic_force(self.strain)
 
 
+def forms_together(experiments):
+    """One object per form of an effect that occurs, with the columns where it acts.
+
+    Neighbouring columns become a slice, which numpy handles faster than a list of indices.
+    """
+    found = {}
+    for column, experiment in enumerate(experiments):
+        for form, size in experiment.hidden:
+            found.setdefault(form, []).append((column, size))
+    forms = []
+    for form, members in found.items():
+        columns, sizes = zip(*members, strict=True)
+        contiguous = columns[-1] - columns[0] + 1 == len(columns)
+        at = slice(columns[0], columns[-1] + 1) if contiguous else np.array(columns)
+        forms.append(form(at, {name: np.array([size[name] for size in sizes]) for name in sizes[0]}))
+    return forms
+
+
 class Batch:
     """Experiments simulated together, those with the same form of an effect side by side."""
 
     def __init__(self, experiments):
-        self.order = sorted(range(len(experiments)), key=lambda k: getattr(experiments[k].form, "__name__", ""))
+        hidden = [[form.__name__ for form, _ in experiment.hidden] for experiment in experiments]
+        self.order = sorted(range(len(experiments)), key=hidden.__getitem__)
         self.experiments = [experiments[k] for k in self.order]
         self.now = Now(self.experiments)
-        self.forms = self._forms()
+        self.forms = forms_together(self.experiments)
         self.length = max(len(experiment.command) for experiment in experiments)
         self.command = self._columns([experiment.command for experiment in self.experiments])
         driven = [self.experiments[k].motion for k in self.now.driven]
         self.motion = self._columns(driven) if driven else np.zeros((self.length, 0))
-
-    def _forms(self):
-        forms, start = [], 0
-        while start < len(self.experiments):
-            form = self.experiments[start].form
-            stop = start + sum(1 for experiment in self.experiments if experiment.form is form)
-            if form is not None:
-                sizes = [experiment.size for experiment in self.experiments[start:stop]]
-                forms.append(form(slice(start, stop), {k: np.array([s[k] for s in sizes]) for k in sizes[0]}))
-            start = stop
-        return forms
 
     def _columns(self, series):
         """Side by side; a shorter one stays where it ends."""
@@ -148,7 +157,7 @@ class Batch:
             now.x[now.driven] = self.motion[0]
 
     def _integrate(self):
-        now, hooks = self.now, {name: self._hooks(name) for name in ("valve", "stretch", "act")}
+        now, hooks = self.now, {name: self._hooks(name) for name in ("aim", "valve", "stretch", "act")}
         self._start()
         for form in self.forms:
             if hasattr(form, "begin"):
@@ -165,7 +174,7 @@ class Batch:
             if k >= 0 and k % STORE_EVERY == 0 and k // STORE_EVERY < len(stored[0]):
                 for row, quantity in zip(stored, (now.p, before, pull), strict=True):
                     row[k // STORE_EVERY] = quantity
-            self._fill(max(k, 0), hooks["valve"])
+            self._fill(max(k, 0), hooks)
         return stored
 
     def _pull(self, hooks):
@@ -193,13 +202,17 @@ class Batch:
         now.x, now.v = now.x + now.step, v
         return pull
 
-    def _fill(self, k, valve_hooks):
+    def _fill(self, k, hooks):
         now = self.now
         command = (self.command[k] + self.command[min(k + 1, self.length - 1)]) / 2
         now.target = VALVE_GAIN * np.maximum(command, 0)
+        now.time_constant[:] = 1 / VALVE_RATE
+        for aim in hooks["aim"]:
+            aim(now)
         before = now.p
-        now.p = now.target + (before - now.target) * np.exp(-VALVE_RATE * STEP)
-        for valve in valve_hooks:
+        kept = np.exp(-STEP / now.time_constant) if hooks["aim"] else KEPT
+        now.p = now.target + (before - now.target) * kept
+        for valve in hooks["valve"]:
             valve(now, before)
 
 

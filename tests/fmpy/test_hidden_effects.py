@@ -1,0 +1,62 @@
+"""Recordings with hidden effects: what `sinew` makes of them."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from support import ROOT, run, write_parameters
+
+HIDDEN_EFFECTS = ROOT / "tests" / "hidden_effects"
+
+# One case of every effect of the library, and some of everything else; two to three minutes.
+BATCH = "any-known:26,none:8,any-unknown:8,pairs:4"
+
+
+def test_fresh_hidden_effects_are_named_as_often_as_claimed(sinew, tmp_path, note):
+    command = [HIDDEN_EFFECTS / "score.py", "--sinew", sinew, "--effects", BATCH, "--keep", tmp_path, "--check"]
+    done = subprocess.run([sys.executable, *map(str, command)], capture_output=True, text=True)
+    note(done.stdout)  # the seed is in its first line
+    assert done.returncode == 0, f"{done.stderr}\n{done.stdout}"
+
+
+@pytest.fixture(scope="module")
+def same_forms(sinew, tmp_path_factory):
+    """Truths of recordings of every effect in the tool's own equations, by name of the case, and their folder."""
+    folder = tmp_path_factory.mktemp("same_forms")
+    names = [effect["name"] for effect in json.loads(run(sinew, "list", "effects", "--json").stdout)]
+    options = ["--seed", 9100, "--cases", 1, "--effects", ",".join(names), "--same-form", "--out", folder]
+    run(sys.executable, HIDDEN_EFFECTS / "generate.py", *options)
+    return {path.stem: json.loads(path.read_text()) for path in sorted((folder / "truths").glob("*.json"))}, folder
+
+
+def errors_in_noise_levels(sinew, truth, recordings, folder):
+    """Of a simulation with the true parameters, one number per recording and signal."""
+    muscle = truth["specimen"]
+    parameters = {
+        "muscle.area_scale": muscle["area"],
+        "muscle.elastic_scale": muscle["elastic"],
+        "muscle.damping": 80 * muscle["damping"],
+        **truth["parameters"],
+    }
+    file = write_parameters(folder / "truth.toml", parameters)
+    done = run(sinew, "simulate", *recordings, "--parameters", file, "--out", folder / "simulated", "--json")
+    errors = json.loads(done.stdout)["errors"]
+    return np.array([error["rms"] / truth["noise_rms"][error["signal"]] for error in errors])
+
+
+def test_an_independent_program_with_the_same_equations_agrees(sinew, same_forms, tmp_path, note):
+    """What is left is noise, that of an imposed motion included, and what sampling loses of the command."""
+    truths, folder = same_forms
+    left = {}
+    for name, truth in truths.items():
+        (tmp_path / name).mkdir()
+        recordings = sorted((folder / "cases" / name).glob("*.csv"))
+        left[truth["effect"]] = errors_in_noise_levels(sinew, truth, recordings, tmp_path / name)
+    note(
+        "Simulated with the true parameters, error in noise levels (mean, most): "
+        + ", ".join(f"{effect} {errors.mean():.2f} {errors.max():.2f}" for effect, errors in left.items())
+    )
+    assert {effect: errors for effect, errors in left.items() if errors.mean() > 1.3 or errors.max() > 2.5} == {}
