@@ -236,7 +236,7 @@ pub trait System: Copy + Send + 'static {
 
 /// A communication step.
 #[derive(Debug, Clone, Copy)]
-pub struct Step<'a, S: System + ?Sized> {
+pub struct Step<'a, S: System> {
     /// Parameters.
     pub parameters: &'a Parameters,
     /// Time at its start, s.

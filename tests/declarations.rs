@@ -59,14 +59,30 @@ fn names_are_unique_and_defaults_are_allowed() {
     }
 }
 
-/// A model in the middle of a simulation, with every effect at work.
-fn running(model: &mut dyn Model, seed: u32) {
+/// Every effect at its typical size in every form, and all refinements, so that nothing is neutral.
+fn everything_at_work() -> Parameters {
     let mut parameters = Parameters::default();
     for effect in Effects::DESCRIPTIONS {
-        effect.typical().for_each(|(name, start)| parameters.set(name, start).unwrap());
+        for (name, starts) in effect.forms.iter().copied().flatten().chain(effect.refinements) {
+            parameters.set(name, starts[0]).unwrap();
+        }
     }
     parameters.initial.gauge_pressure = 2e5;
-    model.reset(&parameters);
+    parameters
+}
+
+/// The parameters with one effect back at its defaults.
+fn without(mut parameters: Parameters, effect: &str) -> Parameters {
+    let nominal = Parameters::default();
+    parameters.visit_mut(&mut |variable, value| {
+        if variable.group() == effect { nominal.get(variable.name).unwrap() } else { value }
+    });
+    parameters
+}
+
+/// Puts a model into the middle of a simulation.
+fn run(model: &mut dyn Model, parameters: &Parameters, seed: u32) {
+    model.reset(parameters);
     let inputs = model.interface().inputs;
     for input in 0..inputs {
         let share = f64::from((seed + 37 * u32::try_from(input).unwrap()) % 100) / 100.0;
@@ -77,17 +93,22 @@ fn running(model: &mut dyn Model, seed: u32) {
 }
 
 proptest! {
-    /// An output depends on an input at once exactly where the description says so.
+    /// An output depends on an input at once exactly where the description says so: with every effect at work, or with
+    /// all but the delay of a sensor, which hides a dependency.
     #[test]
     fn dependencies_are_exact(seed in 0_u32..10_000) {
+        let all = everything_at_work();
+        let undelayed = without(all, "contraction_sensor_delay");
         for mut model in models() {
-            running(model.as_mut(), seed);
             let interface = model.interface();
             for output in interface.inputs..interface.inputs + interface.outputs {
                 let name = interface.variables[output].name;
                 let declared = interface.feedthrough.iter().find(|(of, _)| *of == name).map_or(&[][..], |(_, inputs)| inputs);
                 for input in 0..interface.inputs {
-                    let depends = model.partial_derivative(output, input, false).abs() > 1e-9;
+                    let depends = [all, undelayed].iter().any(|parameters| {
+                        run(model.as_mut(), parameters, seed);
+                        model.partial_derivative(output, input, false).abs() > 1e-9
+                    });
                     let input_name = interface.variables[input].name;
                     prop_assert_eq!(depends, declared.contains(&input_name), "{} on {}", name, input_name);
                 }
@@ -96,45 +117,214 @@ proptest! {
     }
 }
 
-#[test]
-fn neutral_effects_change_nothing_to_the_last_bit() {
-    // The nominal model with every shape parameter of an effect moved, but no effect switched on.
-    let run = |parameters: &Parameters| {
-        let mut model = models().into_iter().next().unwrap();
-        model.reset(parameters);
-        model.initialize(0.0).unwrap();
-        let command = 0;
-        (0..500)
-            .flat_map(|k| {
-                model.set(command, 1.0 + f64::from(k % 100) * 0.01);
-                model.advance(0.01).unwrap();
-                (2..10).map(|output| model.get(output).to_bits()).collect::<Vec<_>>()
-            })
-            .collect::<Vec<_>>()
+/// All outputs of a model while its inputs move along straight lines with corners every 40 ms, every 0.2 s;
+/// `steps` communication steps from corner to corner.
+fn along_lines(model: &mut dyn Model, steps: u32, corners: u32) -> Vec<Vec<f64>> {
+    let interface = model.interface();
+    let level = |input: usize, corner: u32| {
+        let phase = f64::from(corner * (7 + 4 * u32::try_from(input).unwrap()) % 23) / 23.0;
+        match interface.variables[input].declaration.unit.symbol {
+            "V" => 1.5 + phase,
+            "m/s" => 0.2 * (phase - 0.5),
+            "m" => 0.05 + 0.05 * phase,
+            _ => 10.0 * phase,
+        }
     };
-    let nominal = Parameters::default();
-    let mut moved = nominal;
-    moved.set("friction_hysteresis.presliding_displacement", 0.05).unwrap();
-    assert_ne!(nominal, moved);
-    assert_eq!(run(&nominal), run(&moved));
+    let corner_time = 0.04;
+    let span = corner_time / f64::from(steps);
+    let mut course = Vec::new();
+    for corner in 0..corners {
+        for step in 0..steps {
+            for input in 0..interface.inputs {
+                let (from, to) = (level(input, corner), level(input, corner + 1));
+                model.set(input, from + (to - from) * f64::from(step) / f64::from(steps));
+                model.set_slope(input, (to - from) / corner_time);
+            }
+            model.advance(span).unwrap();
+        }
+        if corner % 5 == 4 {
+            let mut outputs = vec![0.0; interface.outputs];
+            model.copy_outputs(&mut outputs);
+            course.push(outputs);
+        }
+    }
+    course
+}
+
+/// The plant with and without load.
+fn plants() -> impl Iterator<Item = Box<dyn Model>> {
+    models().into_iter().filter(|model| model.interface().name.starts_with("Pneumatic"))
 }
 
 #[test]
-fn every_effect_acts_on_the_plant() {
-    for effect in Effects::DESCRIPTIONS {
-        let response = |on: bool| {
-            let mut parameters = Parameters::default();
-            parameters.initial.gauge_pressure = 1e5;
-            if on {
-                effect.typical().for_each(|(name, start)| parameters.set(name, start).unwrap());
+fn results_do_not_depend_on_the_communication_step() {
+    let mut stuck = everything_at_work();
+    stuck.set("valve_dead_band.play", 0.0).unwrap();
+    for parameters in [everything_at_work(), without(everything_at_work(), "valve_dead_band"), stuck] {
+        for mut model in plants() {
+            let mut course = |steps| {
+                run(model.as_mut(), &parameters, 50);
+                along_lines(model.as_mut(), steps, 50)
+            };
+            let coarse = course(1);
+            for steps in [3, 40] {
+                for (coarse, fine) in coarse.iter().zip(course(steps)) {
+                    for (output, (coarse, fine)) in coarse.iter().zip(&fine).enumerate() {
+                        let close = (coarse - fine).abs() <= 2e-5 * coarse.abs().max(1e-2);
+                        assert!(close, "output {output}, {steps} steps: {coarse} {fine}");
+                    }
+                }
             }
-            let mut model = models().into_iter().next().unwrap();
-            model.reset(&parameters);
-            model.initialize(0.0).unwrap();
-            model.set(0, 2.0);
-            model.advance(0.2).unwrap();
-            (2..10).map(|output| model.get(output)).collect::<Vec<_>>()
-        };
-        assert_ne!(response(false), response(true), "{}", effect.name);
+        }
+    }
+}
+
+#[test]
+fn a_restored_run_goes_on_to_the_last_bit() {
+    for mut model in plants() {
+        run(model.as_mut(), &everything_at_work(), 50);
+        along_lines(model.as_mut(), 3, 20);
+        let saved = model.save();
+        let expected = along_lines(model.as_mut(), 3, 20);
+        let end = model.save();
+        let mut other = plants().find(|other| other.interface().name == model.interface().name).unwrap();
+        other.restore(&saved).unwrap();
+        assert_eq!(other.save(), saved);
+        assert_eq!(along_lines(other.as_mut(), 3, 20), expected);
+        assert_eq!(other.save(), end);
+    }
+}
+
+#[test]
+fn a_saved_memory_that_cannot_be_is_refused() {
+    for mut model in plants() {
+        run(model.as_mut(), &everything_at_work(), 50);
+        let saved = model.save();
+        let mut quiet = plants().find(|other| other.interface().name == model.interface().name).unwrap();
+        let fixed = quiet.save().len();
+        assert!(saved.len() > fixed + 10, "nothing is remembered");
+        for length in 0..saved.len() {
+            quiet.restore(&saved[..length]).unwrap_err();
+        }
+        // The end of the fixed part: whether there is a pilot, and after it the number of pieces.
+        for (position, value) in
+            [(fixed - 3, 2.0), (fixed, 1e9), (fixed, 0.5), (fixed, -1.0), (saved.len() - 1, f64::NAN)]
+        {
+            let mut damaged = saved.clone();
+            damaged[position] = value;
+            quiet.restore(&damaged).unwrap_err();
+        }
+        let mut long = saved.clone();
+        long.push(0.0);
+        quiet.restore(&long).unwrap_err();
+    }
+}
+
+#[test]
+fn a_step_that_fails_leaves_the_memory_as_it_was() {
+    let mut model = plants().next().unwrap();
+    run(model.as_mut(), &everything_at_work(), 50);
+    along_lines(model.as_mut(), 1, 10);
+    let before = model.save();
+    model.set_slope(1, -1e12); // a load that is thrown upwards
+    assert!(model.advance(0.1).is_err());
+    model.set_slope(1, 0.0);
+    assert_eq!(model.save(), before);
+}
+
+#[test]
+fn an_extended_plant_starts_at_rest() {
+    for effect in Effects::DESCRIPTIONS {
+        let mut parameters = Parameters::default();
+        effect.typical().for_each(|(name, start)| parameters.set(name, start).unwrap());
+        parameters.initial.gauge_pressure = 1e5;
+        let mut model = models().into_iter().next().unwrap();
+        model.reset(&parameters);
+        model.set(0, 1.0);
+        model.initialize(0.0).unwrap();
+        let start = model.get(2);
+        model.advance(1e-3).unwrap();
+        assert!((model.get(2) - start).abs() < 1e-6, "{} jumps by {} m", effect.name, model.get(2) - start);
+    }
+}
+
+#[test]
+fn neutral_effects_change_nothing_to_the_last_bit() {
+    // The nominal model with every shape parameter of an effect moved, but no effect switched on.
+    let nominal = Parameters::default();
+    let mut moved = nominal;
+    for (parameter, value) in [
+        ("friction_hysteresis.presliding_displacement", 0.05),
+        ("friction_hysteresis.second_share", 0.3),
+        ("friction_hysteresis.second_ratio", 9.0),
+        ("friction_hysteresis.knee", 2.0),
+        ("friction_hysteresis.unloading", 0.3),
+        ("friction_hysteresis.stribeck_share", 0.5),
+        ("friction_hysteresis.stribeck_velocity", 0.03),
+        ("friction_hysteresis.start", 0.7),
+        ("viscous_damping.exponent", 0.5),
+        ("creep.time_1", 1.0),
+        ("creep.time_2", 30.0),
+        ("creep.relaxed_share", 0.2),
+        ("creep.settled_share", 0.6),
+        ("threshold_pressure.fade", 1e5),
+        ("threshold_pressure.exponent", 2.0),
+        ("threshold_pressure.decrease_with_contraction", 0.5),
+        ("series_elasticity.exponent", 0.7),
+        ("valve_lag.growth_with_pressure", 0.5),
+        ("valve_lag.emptying_excess", 0.5),
+        ("valve_resonance.damping_ratio", 0.2),
+        ("valve_resonance.stiffening", 0.5),
+        ("valve_dead_band.start", 1.0),
+        ("supply_saturation.rounding", 1e5),
+        ("supply_saturation.droop", 0.5),
+        ("flow_limit.roundness", 0.5),
+        ("flow_limit.emptying_with_pressure", 0.5),
+        ("flow_limit.volume_growth", 0.5),
+        ("leakage.choked_share", 0.5),
+        ("leakage.volume_growth", 0.5),
+        ("temperature_drift.time_constant", 5.0),
+    ] {
+        moved.set(parameter, value).unwrap();
+    }
+    assert!(moved.effects.are_neutral());
+    // Alone, and beside an effect that is at work, where all hooks are called.
+    let at_work = [nominal, moved].map(|mut parameters| {
+        parameters.effects.payload_mass.additional_mass = 2.0;
+        parameters
+    });
+    for [one, other] in [[nominal, moved], at_work] {
+        for mut model in plants() {
+            let mut course = |parameters| {
+                run(model.as_mut(), parameters, 50);
+                along_lines(model.as_mut(), 2, 100)
+            };
+            assert_eq!(course(&one), course(&other));
+        }
+    }
+}
+
+#[test]
+fn every_form_of_every_effect_acts_on_the_plant() {
+    let course = |parameters: &Parameters| {
+        let mut model = plants().next().unwrap();
+        run(model.as_mut(), parameters, 50);
+        along_lines(model.as_mut(), 1, 50)
+    };
+    for effect in Effects::DESCRIPTIONS {
+        for form in effect.forms {
+            let mut on = Parameters::default();
+            form.iter().for_each(|(name, starts)| on.set(name, starts[0]).unwrap());
+            assert_ne!(course(&Parameters::default()), course(&on), "{form:?}");
+        }
+        for (refinement, starts) in effect.refinements {
+            let [mut with, mut without] = [Parameters::default(); 2];
+            for (name, starts) in effect.forms.iter().copied().flatten() {
+                [&mut with, &mut without].map(|parameters| parameters.set(name, starts[0]).unwrap());
+            }
+            without.set(refinement, Parameters::default().get(refinement).unwrap()).unwrap();
+            with.set(refinement, starts[0]).unwrap();
+            assert_ne!(course(&with), course(&without), "{refinement}");
+        }
     }
 }

@@ -8,8 +8,8 @@ use sinew::plant::{PneumaticMuscle, equilibrium};
 use sinew::simulation::closed_loop;
 use std::path::Path;
 
-/// Largest differences of contraction (m) and pressure (Pa) from a golden file.
-fn differences(preset: &str, file: &str) -> (f64, f64) {
+/// Largest differences of measured contraction (m) and pressure (Pa) from a golden file.
+fn differences(preset: &str, file: &str, effect: &[(&str, f64)]) -> (f64, f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference").join(file);
     let golden = Recording::read(&path, &[]).unwrap();
     let column = |signal| golden.get(signal).unwrap();
@@ -18,12 +18,14 @@ fn differences(preset: &str, file: &str) -> (f64, f64) {
     let mut parameters = Parameters::preset(preset).unwrap();
     parameters.load.mass = golden.load_mass().unwrap();
     parameters.initial.gauge_pressure = parameters.valve.target_pressure(command[0]);
+    effect.iter().for_each(|(name, value)| parameters.set(name, *value).unwrap());
     let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
+    muscle.inputs.command = command[0];
     muscle.initialize(0.0).unwrap();
     let (mut worst_contraction, mut worst_pressure) = (0.0_f64, 0.0_f64);
     for k in 0..golden.time.len() {
         let out = muscle.outputs();
-        worst_contraction = worst_contraction.max((out.contraction - contraction[k]).abs());
+        worst_contraction = worst_contraction.max((out.measured_contraction - contraction[k]).abs());
         worst_pressure = worst_pressure.max((out.gauge_pressure - pressure[k]).abs());
         if k + 1 < golden.time.len() {
             let span = golden.time[k + 1] - golden.time[k];
@@ -48,9 +50,63 @@ fn trajectories_agree_with_scipy() {
         ("dmsp-40-290", "short_muscle_multisine_40kg.csv"),
     ];
     for (preset, file) in cases {
-        let (contraction, pressure) = differences(preset, file);
+        let (contraction, pressure) = differences(preset, file, &[]);
         println!("{file}: contraction within {contraction:.1e} m, pressure within {pressure:.1e} Pa");
         assert!(contraction < 1e-6 && pressure < 1.0, "{file}: {contraction} m, {pressure} Pa");
+    }
+}
+
+#[test]
+fn effects_agree_with_scipy() {
+    let cases: &[(&str, &[(&str, f64)])] = &[
+        (
+            "creep",
+            &[("creep.amplitude_1", 0.1), ("creep.time_1", 1.5), ("creep.amplitude_2", 0.05), ("creep.time_2", 8.0)],
+        ),
+        ("resonance", &[("valve_resonance.natural_frequency", 25.0), ("valve_resonance.damping_ratio", 0.35)]),
+        ("dead_time", &[("valve_dead_time.delay", 0.0373)]),
+        ("play", &[("valve_dead_band.play", 0.11)]),
+        ("stiction", &[("valve_dead_band.stiction", 0.17)]),
+        (
+            "flow_limit",
+            &[
+                ("flow_limit.filling", 1.2e5),
+                ("flow_limit.emptying", 0.8e5),
+                ("flow_limit.roundness", 0.25),
+                ("flow_limit.emptying_with_pressure", 0.4),
+                ("flow_limit.volume_growth", 0.3),
+            ],
+        ),
+        ("leakage", &[("leakage.rate", 0.8), ("leakage.choked_share", 0.4), ("leakage.volume_growth", 0.4)]),
+        ("series_elasticity", &[("series_elasticity.compliance", -8e-6), ("series_elasticity.exponent", 0.85)]),
+        (
+            "threshold",
+            &[
+                ("threshold_pressure.lost", 0.6e5),
+                ("threshold_pressure.fade", 0.7e5),
+                ("threshold_pressure.exponent", 1.5),
+                ("threshold_pressure.decrease_with_contraction", 0.3),
+            ],
+        ),
+        (
+            "friction",
+            &[
+                ("friction_hysteresis.half_width", 12.0),
+                ("friction_hysteresis.half_width_per_pressure", 6e-5),
+                ("friction_hysteresis.presliding_displacement", 3e-3),
+                ("friction_hysteresis.second_share", 0.3),
+                ("friction_hysteresis.knee", 1.6),
+                ("friction_hysteresis.unloading", 0.7),
+                ("friction_hysteresis.stribeck_share", 0.2),
+                ("friction_hysteresis.stribeck_velocity", 0.02),
+                ("friction_hysteresis.start", 0.2),
+            ],
+        ),
+    ];
+    for (name, effect) in cases {
+        let (contraction, pressure) = differences("dmsp-40-1000", &format!("effect_{name}.csv"), effect);
+        println!("{name}: contraction within {contraction:.1e} m, pressure within {pressure:.1e} Pa");
+        assert!(contraction < 1e-6 && pressure < 1.0, "{name}: {contraction} m, {pressure} Pa");
     }
 }
 

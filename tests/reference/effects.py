@@ -1,0 +1,251 @@
+"""Golden trajectories of a hanging load with one effect each, in an implementation of its own.
+
+As in nominal.py the command is linear between samples 10 ms apart; here the integration also restarts wherever the
+command that the valve sees has a corner or a jump. Each case states its equation as text-book mathematics, not as the
+product does: the play of the valve is a running clip of its corners, stiction is stepped from jump to jump.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from muscles import GRAVITY, VIRTUAL_AREA_1000
+from nominal import DAMPING, HEADER, SAMPLE_TIME, VALVE_BANDWIDTH, VALVE_GAIN, ramps, staircase
+
+MASS = 20.0
+AMBIENT = 1e5
+TOLERANCE = 1e-11
+
+
+class Plant:
+    """The nominal plant; effects override what they change. States: pressure, contraction, velocity, own ones."""
+
+    own_scales = ()
+
+    def own_start(self, x):
+        return []
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return []
+
+    def seen(self, command):
+        """Pieces (start, end, value, slope) of the command that the valve sees."""
+        times = np.arange(len(command)) * SAMPLE_TIME
+        slopes = np.diff(command) / SAMPLE_TIME
+        return [(t, t + SAMPLE_TIME, u, s) for t, u, s in zip(times[:-1], command[:-1], slopes)]
+
+    def pressure_rate(self, target, pressure, x, own):
+        return VALVE_BANDWIDTH * (target - pressure)
+
+    def static_force(self, pressure, x, own):
+        return pressure * VIRTUAL_AREA_1000.area(x) + VIRTUAL_AREA_1000.elastic_force(x)
+
+    def force(self, pressure, x, velocity, own):
+        return self.static_force(pressure, x, own) - DAMPING * velocity
+
+    def reading(self, x, force):
+        return x
+
+
+class Creep(Plant):
+    own_scales = 0.1, 0.1
+
+    def own_start(self, x):
+        self.relaxed = x
+        return [0.0, 0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(0.1 * (x - self.relaxed) - own[0]) / 1.5, (0.05 * (x - self.relaxed) - own[1]) / 8.0]
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x - own[0] - own[1], own)
+
+
+class Resonance(Plant):
+    own_scales = (1e6,)
+
+    def own_start(self, x):
+        return [0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [25.0**2 * (target - pressure) - 2 * 0.35 * 25.0 * own[0]]
+
+    def pressure_rate(self, target, pressure, x, own):
+        return own[0]
+
+
+class DeadTime(Plant):
+    DELAY = 0.0373
+
+    def seen(self, command):
+        pieces = super().seen(command)
+        end, first = pieces[-1][1], command[0]
+        late = [(t0 + self.DELAY, min(t1 + self.DELAY, end), u, s) for t0, t1, u, s in pieces if t0 + self.DELAY < end]
+        return [(0.0, self.DELAY, first, 0.0), *late]
+
+
+class Play(Plant):
+    HALF = 0.11
+
+    def seen(self, command):
+        """Every straight piece is cut where the gap closes: there the position begins or ends to follow."""
+        position, result = command[0], []
+        for t0, t1, u, s in super().seen(command):
+            cuts = [t0, t1]
+            if s != 0:
+                cuts += [t for t in (t0 + (position + sign * self.HALF - u) / s for sign in (-1, 1)) if t0 < t < t1]
+            for a, b in zip(sorted(cuts)[:-1], sorted(cuts)[1:]):
+                middle = u + s * ((a + b) / 2 - t0)
+                held = abs(middle - position) <= self.HALF
+                at = lambda t: u + s * (t - t0) - np.sign(s) * self.HALF
+                result.append((a, b, position, 0.0) if held else (a, b, at(a), s))
+                position = position if held else at(b)
+        return result
+
+
+class Stiction(Plant):
+    THRESHOLD = 0.17
+
+    def seen(self, command):
+        stuck, result = command[0], []
+        for t0, t1, u, s in super().seen(command):
+            t = t0
+            while s != 0:
+                jump = t0 + (stuck + np.sign(s) * self.THRESHOLD - u) / s
+                if jump >= t1:
+                    break
+                result.append((t, jump, stuck, 0.0))
+                stuck, t = u + s * (jump - t0), jump
+            result.append((t, t1, stuck, 0.0))
+        return result
+
+
+class FlowLimit(Plant):
+    def pressure_rate(self, target, pressure, x, own):
+        wanted = VALVE_BANDWIDTH * (target - pressure)
+        filling, emptying = 1.2e5 / (1 + 3 * x), 0.8e5 * (0.6 + 0.4 * (pressure + AMBIENT) / 3e5) / (1 + 3 * x)
+        most = filling if wanted > 0 else emptying
+        return wanted / (1 + abs(wanted / most) ** 4) ** 0.25
+
+
+class Leakage(Plant):
+    def pressure_rate(self, target, pressure, x, own):
+        ratio = AMBIENT / (pressure + AMBIENT)
+        psi = 1.0 if ratio < 0.3 else np.sqrt(1 - ((ratio - 0.3) / 0.7) ** 2)
+        hole = (pressure + AMBIENT) * psi * pressure / (pressure + 500.0)
+        leak = 0.8 * (0.6 * pressure + 0.4 * hole) / (1 + 4 * x)
+        return VALVE_BANDWIDTH * (target - pressure) - leak
+
+
+class SeriesElasticity(Plant):
+    def reading(self, x, force):
+        return x - 8e-6 * 400 * (force / 400) ** 0.85
+
+
+class Threshold(Plant):
+    def static_force(self, pressure, x, own):
+        lost = 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5)) * (1 - 3 * x)
+        return super().static_force(pressure - lost, x, own)
+
+
+class Friction(Plant):
+    own_scales = 1.0, 1.0
+
+    def own_start(self, x):
+        return [0.2, 0.2]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        def rate(z, way):
+            return velocity / way * (1 - (0.7 * np.sign(velocity * z) + 0.3) * abs(z) ** 1.6)
+
+        return [rate(own[0], 3e-3), rate(own[1], 1.2e-2)]
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x, own) - (12 + 6e-5 * pressure) * (0.7 * own[0] + 0.3 * own[1])
+
+    def force(self, pressure, x, velocity, own):
+        stribeck = (12 + 6e-5 * pressure) * (0.7 * own[0] + 0.3 * own[1]) * 0.2 * np.exp(-((velocity / 0.02) ** 2))
+        return super().force(pressure, x, velocity, own) - stribeck
+
+
+STAIRS = staircase([0.8, 1.5, 2.0, 1.2], 1.2)
+RAMPS = ramps([(0, 1.0), (0.3, 1.0), (1.5, 2.0), (2.0, 2.0), (2.6, 1.4), (3.0, 1.9), (3.6, 1.2), (4.4, 1.3), (5, 1.3)])
+
+
+@dataclass(frozen=True)
+class Case:
+    name: str
+    plant: Plant
+    command: np.ndarray = field(repr=False)
+
+
+CASES = [
+    Case("creep", Creep(), STAIRS),
+    Case("resonance", Resonance(), STAIRS),
+    Case("dead_time", DeadTime(), RAMPS),
+    Case("play", Play(), RAMPS),
+    Case("stiction", Stiction(), RAMPS),
+    Case("flow_limit", FlowLimit(), STAIRS),
+    Case("leakage", Leakage(), STAIRS),
+    Case("series_elasticity", SeriesElasticity(), RAMPS),
+    Case("threshold", Threshold(), STAIRS),
+    Case("friction", Friction(), RAMPS),
+]
+
+
+def start(case):
+    """The load hangs still at the pressure that the first command asks for."""
+    pressure, plant = VALVE_GAIN * case.command[0], case.plant
+    surplus = lambda x: plant.force(pressure, x, 0.0, plant.own_start(x)) - MASS * GRAVITY
+    x = brentq(surplus, 0.0, 0.22, xtol=1e-15, rtol=1e-15)
+    return np.array([pressure, x, 0.0, *plant.own_start(x)])
+
+
+def solve(case):
+    """States at the samples."""
+    plant, state = case.plant, start(case)
+    scales = np.array([1e5, 0.1, 0.1, *plant.own_scales])
+    end = (len(case.command) - 1) * SAMPLE_TIME
+    samples = np.arange(len(case.command)) * SAMPLE_TIME
+    states, next_sample = [state], 1
+
+    def derivative(t, state, t0, value, slope):
+        pressure, x, velocity, *own = state
+        target = VALVE_GAIN * (value + slope * (t - t0))
+        push = plant.force(pressure, x, velocity, own) / MASS - GRAVITY
+        own_rates = plant.own_rates(target, pressure, x, velocity, own)
+        return [plant.pressure_rate(target, pressure, x, own), velocity, push, *own_rates]
+
+    for t0, t1, value, slope in plant.seen(case.command):
+        # Samples within the piece are stops, too.
+        stops = [t0, *samples[(samples > t0 + 1e-9) & (samples < t1 - 1e-9)], min(t1, end)]
+        for a, b in zip(stops[:-1], stops[1:]):
+            if b - a > 1e-12:
+                piece = solve_ivp(derivative, (a, b), state, "DOP853", args=(t0, value, slope), max_step=5e-3,
+                                  rtol=TOLERANCE, atol=TOLERANCE * scales * 1e-2)
+                state = piece.y[:, -1]
+            if next_sample < len(samples) and abs(b - samples[next_sample]) < 1e-9:
+                states.append(state)
+                next_sample += 1
+    assert len(states) == len(case.command)
+    return np.array(states)
+
+
+def main():
+    for case in CASES:
+        rows = []
+        for time, command, state in zip(np.arange(len(case.command)) * SAMPLE_TIME, case.command, solve(case)):
+            pressure, x, velocity, *own = state
+            assert 0 < x < 0.22, f"{case.name}: contraction {x} m"
+            force = case.plant.force(pressure, x, velocity, own)
+            rows.append([time, command, pressure, case.plant.reading(x, force), velocity, force, MASS])
+        path = Path(__file__).parent / f"effect_{case.name}.csv"
+        np.savetxt(path, rows, "%.12g", ",", header=HEADER, comments="")
+        print(f"{path.name}: {len(rows)} samples")
+
+
+if __name__ == "__main__":
+    main()
