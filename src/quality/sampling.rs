@@ -19,7 +19,10 @@ pub fn notes(recording: &Recording, parameters: &Parameters) -> Vec<String> {
     let intervals: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let Some(usual) = quantile(&intervals, 0.5) else { return Vec::new() };
     let mut notes = Vec::new();
-    let valve_time = recording.get(Signal::Command).map(|_| 1.0 / parameters.valve.bandwidth);
+    let lasts = recording.time[recording.time.len() - 1] - recording.time[0];
+    // A valve slower than the whole recording is shut.
+    let valve_time =
+        recording.get(Signal::Command).map(|_| 1.0 / parameters.valve.bandwidth).filter(|time| *time < lasts);
     // What is shorter than the valve's own time loses nothing.
     let longest_allowed = (GAP * usual).max(valve_time.unwrap_or(0.0));
     notes.extend(

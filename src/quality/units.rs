@@ -17,6 +17,8 @@ const HIGHEST_PRESSURE: f64 = 20e5;
 const LOWEST_PRESSURE: f64 = 0.02e5;
 /// The nominal model may be poor; a unit is wrong where another one makes the model's error this many times smaller.
 const MUCH_BETTER: f64 = 10.0;
+/// The model must mean something in that unit: where it gave no force at all it would be wrong by 1.
+const MEANINGFUL: f64 = 0.5;
 
 /// A column that is too large by a factor (below 1: too small), and what says so.
 struct Doubt {
@@ -226,7 +228,7 @@ fn units_that_fit_better(recording: &Recording, parameters: &Parameters) -> Opti
             }
         }
     }
-    let (signal, excess, error) = best.filter(|(.., error)| MUCH_BETTER * error < as_it_is)?;
+    let (signal, excess, error) = best.filter(|(.., error)| *error < MEANINGFUL.min(as_it_is / MUCH_BETTER))?;
     let evidence = format!(
         "{} makes the nominal force wrong by {} times what was measured; in another unit by {}",
         header(recording, signal),
