@@ -2,7 +2,7 @@
 //!
 //! In the order data flows: [`variables`] declares what there is; [`muscle`], [`valve`], [`load`] and [`effects`] are the
 //! physics, [`memory`] what they remember; [`plant`], [`controller`] and [`mod@reference`] put it together; [`model`] steps it and [`mod@model_description`] describes
-//! it; [`models`] lists them. With the feature `tool`, [`package`] makes FMUs and [`mod@export`] writes them, [`measurement`] reads recordings, [`simulation`] replays them and
+//! it; [`models`] lists them. With the feature `tool`, [`package`] makes FMUs and [`mod@export`] writes them, [`measurement`] reads recordings, [`quality`] says what they can bear, [`simulation`] replays them and
 //! [`diagnosis`] says what the model gets wrong.
 
 pub mod error;
@@ -36,6 +36,8 @@ pub mod measurement;
 pub mod package;
 #[cfg(feature = "tool")]
 pub mod plot;
+#[cfg(feature = "tool")]
+pub mod quality;
 #[cfg(feature = "tool")]
 pub mod simulation;
 #[cfg(feature = "tool")]

@@ -22,7 +22,7 @@ pub enum Signal {
 use Signal::{Command, Contraction, Diameter, Force, GaugePressure, LoadMass, SupplyPressure, Temperature, Time};
 
 /// Symbols of units with their size in SI; the first is SI.
-type Units = &'static [(&'static str, f64)];
+pub type Units = &'static [(&'static str, f64)];
 
 const PRESSURE: Units =
     &[("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6), ("mbar", 1e2), ("bar", 1e5), ("psi", 6_894.757_293_168)];
@@ -49,7 +49,12 @@ impl Signal {
 
     /// Unit in SI.
     pub fn unit(self) -> &'static str {
-        COLUMNS.iter().find(|(_, signal, _)| *signal == self).map_or("", |(.., units)| units[0].0)
+        self.units().first().map_or("", |(symbol, _)| symbol)
+    }
+
+    /// Units that a file may use.
+    pub fn units(self) -> Units {
+        COLUMNS.iter().find(|(_, signal, _)| *signal == self).map_or(&[], |(.., units)| units)
     }
 }
 
@@ -64,6 +69,8 @@ pub struct Recording {
     pub time: Vec<f64>,
     /// The other signals in SI units, each of shape `(n_samples,)`; NaN where a sample is missing.
     signals: BTreeMap<Signal, Vec<f64>>,
+    /// Unit that the file names for each column.
+    units: BTreeMap<Signal, &'static str>,
     /// What a person should know about how the file was read.
     pub notes: Vec<String>,
 }
@@ -120,7 +127,8 @@ impl Recording {
         }
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let time = signals.remove(&Time).unwrap_or_default();
-        Self { path: path.to_owned(), name, time, signals, notes }.checked()
+        let units = columns.iter().flatten().map(|column| (column.signal, column.unit)).collect();
+        Self { path: path.to_owned(), name, time, signals, units, notes }.checked()
     }
 
     /// Refuses what no use could be made of, and drops rows without a new time.
@@ -164,6 +172,11 @@ impl Recording {
     /// A signal in SI units, NaN where a sample is missing; `None` where there is no such column.
     pub fn get(&self, signal: Signal) -> Option<&[f64]> {
         self.signals.get(&signal).map(Vec::as_slice)
+    }
+
+    /// Unit that the file names for a signal; `None` where there is no such column.
+    pub fn unit_in_file(&self, signal: Signal) -> Option<&'static str> {
+        self.units.get(&signal).copied()
     }
 
     /// A signal with its gaps bridged by straight lines, for use as an input.
@@ -220,6 +233,7 @@ pub fn read_all(paths: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<R
 struct Column {
     header: String,
     signal: Signal,
+    unit: &'static str,
     scale: f64,
     offset: f64,
 }
@@ -263,10 +277,10 @@ fn understand(
     let known = units.iter().map(|(symbol, _)| *symbol).collect::<Vec<_>>().join(", ");
     let fail = |problem| Error::Csv { path: path.to_owned(), line: 1, column: Some(header.to_owned()), problem };
     let unit = unit.ok_or_else(|| fail(format!("the header has no unit: write `{name} [{}]`", units[0].0)))?;
-    let scale = units.iter().find(|(symbol, _)| *symbol == unit).map(|(_, scale)| *scale);
-    let scale = scale.ok_or_else(|| fail(format!("unit `{unit}` is unknown: use one of {known}")))?;
+    let found = units.iter().find(|(symbol, _)| *symbol == unit);
+    let (unit, scale) = *found.ok_or_else(|| fail(format!("unit `{unit}` is unknown: use one of {known}")))?;
     let offset = if unit == "degC" { 273.15 } else { 0.0 };
-    Ok(Some(Column { header: header.to_owned(), signal: *signal, scale, offset }))
+    Ok(Some(Column { header: header.to_owned(), signal: *signal, unit, scale, offset }))
 }
 
 /// Refuses a wrong separator and renamings of columns that are not there.

@@ -67,6 +67,9 @@ const PRESETS: &[Preset] = &[
 /// The controller as the thesis prints it; a variant of every preset.
 const THESIS_CONTROLLER: &str = include_str!("../presets/thesis.toml");
 
+/// An ideal muscle holds a load only under pressure.
+const MCKIBBEN: &str = include_str!("../presets/mckibben.toml");
+
 /// Names of all presets and their variants, each with a line on what it is.
 pub fn presets() -> Vec<(String, String)> {
     let mut all = Vec::new();
@@ -97,6 +100,7 @@ impl Parameters {
         for variant in parts {
             match variant {
                 "thesis" => parameters.apply_toml(THESIS_CONTROLLER, "thesis")?,
+                "mckibben" => parameters.apply_toml(MCKIBBEN, "mckibben")?,
                 model if ForceModelName::CHOICES.iter().any(|c| c.name == model) => {
                     parameters.set_text("muscle.force_model", model)?;
                 }
@@ -270,7 +274,7 @@ mod tests {
             ("[load]\nmass = -3", "f.toml: `load.mass` is -3 kg, allowed is 0.001 to 100000 kg"),
             (
                 "[muscle]\nforce_model = \"x\"",
-                "f.toml: `muscle.force_model` takes one of virtual-area, improved-mckibben, not `x`",
+                "f.toml: `muscle.force_model` takes one of virtual-area, improved-mckibben, mckibben, not `x`",
             ),
             ("[load]\nmass = \"x\"", "f.toml: `load.mass` takes a number, not `x`"),
             ("[load]\nmass = true", "f.toml: `load.mass` takes a number or a name, not `boolean`"),

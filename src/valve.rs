@@ -5,7 +5,7 @@ crate::variables::variables! {
     ///
     /// # Model
     /// dp/dt = ω (K_v u − p): gauge pressure p, command u, `gain` K_v, `bandwidth` ω. The target K_v u is never below
-    /// ambient pressure.
+    /// ambient pressure. A valve that is shut has the smallest `bandwidth`: the pressure then stays for years.
     ///
     /// # Reference
     /// Thesis eq. 5.3; the measured cut-off is 2.5 Hz, which is 15.7 rad/s (the printed transfer function reads
@@ -14,7 +14,7 @@ crate::variables::variables! {
         /// Pressure per volt of command
         gain: f64 = 1e5, PASCAL_PER_VOLT, (1.0..=1e9);
         /// Cut-off (-3 dB) of the valve
-        bandwidth: f64 = 2.5 * std::f64::consts::TAU, RADIAN_PER_SECOND, (1e-3..=1e4);
+        bandwidth: f64 = 2.5 * std::f64::consts::TAU, RADIAN_PER_SECOND, (1e-9..=1e4);
     }
 }
 

@@ -1,4 +1,4 @@
-use super::{ForceModel, Muscle};
+use super::{ForceModel, McKibben, Muscle};
 use std::f64::consts::PI;
 
 crate::variables::variables! {
@@ -40,8 +40,7 @@ impl ImprovedMcKibben {
 
 impl ForceModel for ImprovedMcKibben {
     fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64 {
-        let length = muscle.rest_length - contraction;
-        (3.0 * length.powi(2) - muscle.thread_length.powi(2)) / (4.0 * PI * muscle.turns.powi(2))
+        McKibben.virtual_area(muscle, contraction)
     }
 
     fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64 {

@@ -145,6 +145,7 @@ force_models! {
         "pressure times a virtual area, plus an elastic force, both polynomials of the contraction (thesis eq. 4.5)";
     ImprovedMcKibben(ImprovedMcKibben, improved_mckibben) = 2, "improved-mckibben",
         "McKibben braid with the elasticity of the membrane (thesis eq. 4.17, corrected)";
+    McKibben(McKibben, mckibben) = 3, "mckibben", "ideal McKibben braid, without any elasticity (thesis eq. 4.15, corrected)";
 }
 
 impl ForceModels {

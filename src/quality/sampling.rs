@@ -1,0 +1,135 @@
+//! When samples were taken: gaps, uneven and slow sampling, and what a recording is too short for.
+
+use super::{quantile, rounded};
+use crate::effects::Effects;
+use crate::measurement::{Recording, Signal};
+use crate::parameters::Parameters;
+use crate::simulation::OUTPUTS;
+use crate::variables::units::SECOND;
+
+/// A gap is an interval of so many usual ones: estimates of noise and velocity look at up to nine neighbours.
+const GAP: f64 = 10.0;
+/// Sampling is uneven where its slow and fast intervals are a decade apart: neighbours then no longer mean the same time.
+const UNEVEN: f64 = 10.0;
+/// A column that mostly is not there.
+const MOSTLY: f64 = 0.5;
+
+/// Findings on the times of one recording.
+pub fn notes(recording: &Recording, parameters: &Parameters) -> Vec<String> {
+    let intervals: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let Some(usual) = quantile(&intervals, 0.5) else { return Vec::new() };
+    let mut notes = Vec::new();
+    let lasts = recording.time[recording.time.len() - 1] - recording.time[0];
+    // A valve slower than the whole recording is shut.
+    let valve_time =
+        recording.get(Signal::Command).map(|_| 1.0 / parameters.valve.bandwidth).filter(|time| *time < lasts);
+    // What is shorter than the valve's own time loses nothing.
+    let longest_allowed = (GAP * usual).max(valve_time.unwrap_or(0.0));
+    notes.extend(
+        gaps(&recording.time, longest_allowed)
+            .map(|found| format!("{found}: inputs are joined by straight lines there")),
+    );
+    let inputs_and_outputs = OUTPUTS.into_iter().chain([Signal::Command]);
+    notes.extend(inputs_and_outputs.filter_map(|signal| missing(recording, signal, longest_allowed)));
+    notes.extend(uneven(&intervals));
+    notes.extend(valve_time.filter(|time| usual > *time).map(|time| {
+        format!(
+            "samples are {} s apart and the valve answers within {} s: its lag, dead time and resonance cannot be judged",
+            rounded(usual),
+            rounded(time)
+        )
+    }));
+    notes
+}
+
+/// Intervals between times that are longer than allowed, in words.
+fn gaps(times: &[f64], longest_allowed: f64) -> Option<String> {
+    let gaps =
+        times.windows(2).map(|pair| (pair[1] - pair[0], pair[0])).filter(|(length, _)| *length > longest_allowed);
+    let (count, (longest, at)) =
+        gaps.fold((0, (0.0, 0.0)), |(count, longest), gap| (count + 1, if gap.0 > longest.0 { gap } else { longest }));
+    let word = if count == 1 { "gap" } else { "gaps" };
+    (count > 0).then(|| format!("{count} {word} in time, the longest of {} s at {} s", rounded(longest), rounded(at)))
+}
+
+/// Missing samples of one column beyond those of whole rows.
+fn missing(recording: &Recording, signal: Signal, longest_allowed: f64) -> Option<String> {
+    let values = recording.get(signal)?;
+    let there = values.iter().filter(|value| !value.is_nan()).count();
+    if there == 0 {
+        return Some(format!("`{}` is empty", signal.name()));
+    }
+    let share = 1.0 - there as f64 / values.len() as f64;
+    if share > MOSTLY {
+        return Some(format!("`{}` is missing in {:.0} % of the rows", signal.name(), 100.0 * share));
+    }
+    let known = recording.time.iter().zip(values).enumerate().filter(|(_, (_, value))| !value.is_nan());
+    let known: Vec<(usize, f64)> = known.map(|(row, (time, _))| (row, *time)).collect();
+    let own = known
+        .windows(2)
+        .filter(|pair| pair[1].0 > pair[0].0 + 1)
+        .max_by(|a, b| (a[1].1 - a[0].1).total_cmp(&(b[1].1 - b[0].1)))?;
+    let (from, to) = (own[0].1, own[1].1);
+    (to - from > longest_allowed)
+        .then(|| format!("`{}` is missing from {} s to {} s", signal.name(), rounded(from), rounded(to)))
+}
+
+fn uneven(intervals: &[f64]) -> Option<String> {
+    let (fast, slow) = (quantile(intervals, 0.05)?, quantile(intervals, 0.95)?);
+    let text = || {
+        format!(
+            "sampling is uneven, with intervals from {} s to {} s: noise and velocity are estimated poorly",
+            rounded(fast),
+            rounded(slow)
+        )
+    };
+    (slow > UNEVEN * fast).then(text)
+}
+
+/// Effects that are slower than the longest recording.
+///
+/// Within its time constant an exponential shows 63 % of itself; in less it cannot be told from a straight line.
+pub fn too_short(recordings: &[Recording]) -> Option<String> {
+    let lasts = |recording: &Recording| recording.time[recording.time.len() - 1] - recording.time[0];
+    let longest = recordings.iter().map(lasts).fold(0.0, f64::max);
+    slower_than(longest, &slow_effects())
+}
+
+fn slower_than(longest: f64, effects: &[(&str, f64)]) -> Option<String> {
+    let slower = effects.iter().filter(|(_, time)| *time > longest);
+    let words: Vec<String> = slower.map(|(name, time)| format!("{name} (about {} s)", rounded(*time))).collect();
+    let text = || {
+        format!(
+            "the longest recording lasts {} s: too short for {}, which can be neither named nor ruled out",
+            rounded(longest),
+            words.join(", ")
+        )
+    };
+    (!words.is_empty()).then(text)
+}
+
+/// Effects with the longest time, s, from which a fit of theirs starts: what is usual of them.
+fn slow_effects() -> Vec<(&'static str, f64)> {
+    let defaults = Parameters::default();
+    let is_time = |name: &str| defaults.find(name).is_some_and(|(variable, _)| variable.unit == SECOND);
+    let slowest = |freed: &[crate::effects::Freed]| {
+        freed.iter().filter(|(name, _)| is_time(name)).flat_map(|(_, starts)| *starts).copied().fold(0.0, f64::max)
+    };
+    Effects::DESCRIPTIONS
+        .iter()
+        .map(|effect| (effect.name, effect.forms.iter().map(|form| slowest(form)).fold(0.0, f64::max)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slow_effects_need_long_recordings() {
+        let effects = [("creep", 30.0), ("valve_lag", 0.05)];
+        let found = slower_than(12.0, &effects).unwrap();
+        assert!(found.contains("12 s: too short for creep (about 30 s)") && !found.contains("valve_lag"), "{found}");
+        assert_eq!(slower_than(40.0, &effects), None);
+    }
+}

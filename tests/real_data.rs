@@ -1,0 +1,106 @@
+//! The published measurements in `data/real`: signs, units and sizes as a calculation by hand finds them.
+
+use sinew::measurement::Signal::{Contraction, Force, GaugePressure};
+use sinew::measurement::{Recording, Signal};
+use sinew::parameters::Parameters;
+use sinew::quality::notes;
+use sinew::simulation::{replay, rms_difference};
+use std::path::{Path, PathBuf};
+
+fn real(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/real").join(name)
+}
+
+fn load(recording: &str, parameters: &str) -> (Recording, Parameters) {
+    let parameters = Parameters::load(&real(parameters).display().to_string()).unwrap();
+    (Recording::read(&real(recording), &[]).unwrap(), parameters)
+}
+
+/// Measured less simulated.
+fn residual(recording: &Recording, parameters: &Parameters, signal: Signal) -> Vec<f64> {
+    let replay = replay(parameters, recording).unwrap();
+    recording.get(signal).unwrap().iter().zip(replay.get(signal).unwrap()).map(|(m, s)| m - s).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Half the difference of the force residual between shortening and lengthening, N, in the middle of the strokes.
+fn half_width(name: &str, parameters: &str) -> f64 {
+    let (recording, parameters) = load(&format!("cylinder/{name}.csv"), parameters);
+    let contraction = recording.get(Contraction).unwrap();
+    let residual = residual(&recording, &parameters, Force);
+    let (mut lengthens, mut shortens) = (Vec::new(), Vec::new());
+    for k in 4..contraction.len() - 4 {
+        let velocity = (contraction[k + 4] - contraction[k - 4]) / (recording.time[k + 4] - recording.time[k - 4]);
+        if (0.010..0.035).contains(&contraction[k]) && velocity.abs() > 2e-3 && recording.time[k] > 3.0 {
+            if velocity > 0.0 { shortens.push(residual[k]) } else { lengthens.push(residual[k]) }
+        }
+    }
+    (mean(&lengthens) - mean(&shortens)) / 2.0
+}
+
+#[test]
+fn a_cylinder_pulls_less_when_its_chamber_grows_by_what_a_hand_calculation_gives() {
+    for (name, parameters, by_hand) in [
+        ("circle_1bar", "cylinder/cylinder_25.toml", 3.97),
+        ("circle_3bar", "cylinder/cylinder_25.toml", 5.55),
+        ("circle_5bar", "cylinder/cylinder_25.toml", 7.12),
+        ("circle_7bar", "cylinder/cylinder_25.toml", 7.95),
+        ("nap310_5bar", "cylinder/cylinder_25.toml", 5.15),
+        ("x_ring257_7bar", "cylinder/cylinder_25_7.toml", 15.81),
+        ("kidney_lc_3bar", "cylinder/cylinder_25.toml", 8.58),
+    ] {
+        let found = half_width(name, parameters);
+        assert!((found - by_hand).abs() < 0.1, "{name}: {found} N, by hand {by_hand} N");
+    }
+}
+
+#[test]
+fn the_nominal_pressure_of_a_shut_chamber_stays() {
+    for name in ["aluminium", "prusa", "formlabs", "ultimaker_006", "ultimaker_015", "ultimaker_020"] {
+        let (recording, parameters) = load(&format!("chamber/{name}.csv"), "chamber/shut.toml");
+        let replay = replay(&parameters, &recording).unwrap();
+        let nominal = replay.get(GaugePressure).unwrap();
+        assert!(nominal.iter().all(|pressure| (pressure - nominal[0]).abs() < 1.0), "{name}");
+        let measured = recording.get(GaugePressure).unwrap();
+        assert!(measured[measured.len() - 1] < measured[0], "{name} leaks");
+    }
+}
+
+#[test]
+fn an_ideal_muscle_is_far_too_strong_for_the_static_maps() {
+    for (name, by_hand) in [("dmsp_20_300", 236.0), ("dmsp_10_250", 94.0)] {
+        let (recording, parameters) = load(&format!("map/{name}.csv"), &format!("map/{name}.toml"));
+        let replay = replay(&parameters, &recording).unwrap();
+        let rms = rms_difference(recording.get(Force).unwrap(), replay.get(Force).unwrap()).unwrap();
+        assert!((rms - by_hand).abs() < 1.0, "{name}: {rms} N");
+    }
+}
+
+#[test]
+fn only_gaps_and_constant_inputs_are_noted() {
+    let expected = ["in time, the longest of", "`command` is constant", "`contraction` is 0 mm throughout"];
+    for (folder, parameters) in
+        [("cylinder", "cylinder/cylinder_25.toml"), ("chamber", "chamber/shut.toml"), ("map", "map/dmsp_20_300.toml")]
+    {
+        for entry in std::fs::read_dir(real(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "csv") {
+                let name = format!("{folder}/{}", path.file_name().unwrap().to_string_lossy());
+                let (recording, parameters) = load(&name, parameters);
+                for note in notes(&[recording], &parameters).unwrap() {
+                    assert!(expected.iter().any(|known| note.contains(known)), "{note}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wrong_muscle_is_not_taken_for_a_wrong_unit() {
+    let (recording, _) = load("cylinder/kidney_lc_1bar.csv", "cylinder/cylinder_25.toml");
+    let found = notes(&[recording], &Parameters::default()).unwrap();
+    assert!(found.iter().all(|note| note.contains("in time")), "{found:?}");
+}
