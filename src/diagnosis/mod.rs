@@ -124,12 +124,12 @@ pub fn diagnose(
         path: recordings[0].path.clone(),
         problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
     };
-    let mut bench = Bench::new(Data::new(recordings, nominal)?, nominal, tolerance);
+    let mut bench = Bench::new(Data::new(recordings, nominal, tolerance)?, nominal, tolerance);
     let first = bench.baseline().ok_or_else(cannot_follow)?;
     bench.refine_noise(&first.residuals);
     let baseline = bench.baseline().ok_or_else(cannot_follow)?;
     done("nominal");
-    let chosen = Search::new(&mut bench, baseline, tolerance).run(done).ok_or_else(cannot_follow)?;
+    let chosen = Search::new(&mut bench, baseline).run(done).ok_or_else(cannot_follow)?;
     Ok(answer(&bench, nominal, chosen).ok_or_else(cannot_follow)?)
 }
 
