@@ -81,20 +81,35 @@ class Browser:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def drag(self, selector, start, end, modifiers=0):
-        """Drags across the first such element, from one share of its width to another."""
-        box = self.evaluate(f"""(() => {{
+    def box(self, selector):
+        """Left, top, width and height on the screen of the first such element."""
+        return self.evaluate(f"""(() => {{
             const element = document.querySelector({json.dumps(selector)});
             element.scrollIntoView({{ block: "center" }});
             const box = element.getBoundingClientRect();
             return [box.left, box.top, box.width, box.height];
         }})()""")
+
+    def drag(self, selector, start, end, modifiers=0):
+        """Drags across the first such element, from one share of its width to another."""
+        box = self.box(selector)
         y = box[1] + box[3] / 2
         for kind, share in (("mouseMoved", start), ("mousePressed", start), ("mouseMoved", (start + end) / 2),
                             ("mouseMoved", end), ("mouseReleased", end)):
             self.call("Input.dispatchMouseEvent", type=kind, x=box[0] + share * box[2], y=y, modifiers=modifiers,
                       button="none" if kind == "mouseMoved" else "left", buttons=int(kind != "mouseReleased"),
                       clickCount=int(kind != "mouseMoved"))
+
+    def swipe(self, selector, start, end):
+        """As `drag`, with a finger."""
+        box = self.box(selector)
+        self.call("Emulation.setTouchEmulationEnabled", enabled=True)
+        for k in range(11):
+            x = box[0] + box[2] * (start + (end - start) * k / 10)
+            point = {"x": x, "y": box[1] + box[3] / 2}
+            self.call("Input.dispatchTouchEvent", type="touchMove" if k else "touchStart", touchPoints=[point])
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+        self.call("Emulation.setTouchEmulationEnabled", enabled=False)
 
     def screenshot(self, path):
         shot = self.call("Page.captureScreenshot", captureBeyondViewport=True)
@@ -174,7 +189,7 @@ INK = """[...document.querySelectorAll(".plot")].map((place) => {
 def test_draws_without_errors_and_fits(browser, report, tmp_path, note, width, scheme):
     browser.open(report, width, scheme=scheme)
     assert browser.problems == []
-    overflow = browser.evaluate("document.documentElement.scrollWidth - innerWidth")
+    overflow = browser.evaluate("document.documentElement.scrollWidth") - width
     assert overflow <= 0, f"{overflow} px wider than the screen"
     ink = browser.evaluate(INK)
     assert len(ink) >= 4 and min(ink) > 0.01, ink
@@ -183,19 +198,20 @@ def test_draws_without_errors_and_fits(browser, report, tmp_path, note, width, s
 
 
 RANGE = "document.querySelector('output').value.split(' to ').map(parseFloat)"
+PICTURES = "[...document.querySelector('.recording').querySelectorAll('canvas')].map(c => c.toDataURL())"
 AREA = ".recording .u-over"
 
 
 def test_drag_zooms_all_plots_of_a_recording(browser, report):
     browser.open(report)
     whole = browser.evaluate(RANGE)
-    before = browser.evaluate("[...document.querySelector('.recording').querySelectorAll('canvas')].map(c => c.toDataURL())")
+    before = browser.evaluate(PICTURES)
     browser.drag(AREA, 0.25, 0.5)
     low, high = browser.evaluate(RANGE)
     quarter = (whole[1] - whole[0]) / 4
     assert low == pytest.approx(whole[0] + quarter, abs=0.1 * quarter)
     assert high == pytest.approx(whole[0] + 2 * quarter, abs=0.1 * quarter)
-    after = browser.evaluate("[...document.querySelector('.recording').querySelectorAll('canvas')].map(c => c.toDataURL())")
+    after = browser.evaluate(PICTURES)
     assert all(a != b for a, b in zip(after, before, strict=True))
     browser.drag(AREA, 0.5, 0.25, modifiers=8)  # Shift
     moved = browser.evaluate(RANGE)
@@ -203,6 +219,15 @@ def test_drag_zooms_all_plots_of_a_recording(browser, report):
     assert moved[1] - moved[0] == pytest.approx(high - low, abs=0.02)
     browser.evaluate("document.querySelector('[data-tool=whole]').click()")
     assert browser.evaluate(RANGE) == whole
+    assert browser.problems == []
+
+
+def test_finger_zooms(browser, report):
+    browser.open(report, PHONE)
+    whole = browser.evaluate(RANGE)
+    browser.swipe(AREA, 0.2, 0.7)
+    low, high = browser.evaluate(RANGE)
+    assert (high - low) / (whole[1] - whole[0]) == pytest.approx(0.5, abs=0.1)
     assert browser.problems == []
 
 

@@ -53,7 +53,7 @@ impl Residuals {
                 values.push(all);
             }
         }
-        let value = |variable: Variable| variables.iter().position(|v| *v == variable).map(|k| values[k].clone());
+        let value = |variable: Variable| variables.iter().position(|v| *v == variable).map(|k| values[k].as_slice());
         let models = models(diagnosis, nominal);
         let mut links = Vec::new();
         let mut residuals = vec![Vec::new(); models.len()];
@@ -63,7 +63,7 @@ impl Residuals {
             let of_model =
                 |chains: &Vec<Chain>| pooled(recordings.iter().zip(chains).map(|(r, chain)| (r, chain.residual(link))));
             let all: Vec<Vec<f64>> = chains.iter().map(of_model).collect();
-            let Some(exposure) = most_telling(&all[0], value) else { continue };
+            let Some(exposure) = most_telling(link, &all[0], value) else { continue };
             if mean_square(&all[0]).is_some() {
                 links.push((link, exposure));
                 residuals.iter_mut().zip(all).for_each(|(model, residual)| model.push(residual));
@@ -93,10 +93,10 @@ impl Residuals {
     }
 
     fn clearest(&self, model: usize, removed: &dyn Fn(&[f64], usize) -> f64) -> Option<Exposed> {
-        let value = |variable: Variable| Some(self.values[self.position(variable)?].clone());
+        let value = |variable: Variable| Some(self.values[self.position(variable)?].as_slice());
         let all = (0..self.links.len()).filter_map(|link| {
             let before = &self.residuals[model][link];
-            let exposure = most_telling(before, value)?;
+            let exposure = most_telling(self.links[link].0, before, value)?;
             let variable = self.position(exposure.variable)?;
             Some((exposure.share * removed(before, link), Exposed { link, variable }))
         });

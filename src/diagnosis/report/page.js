@@ -18,7 +18,7 @@
     values: (_, ticks) => ticks.map((tick) => digits(tick, 8)), ...more,
   });
   const across = (label) => axis(label, { size: label ? 37 : 24, space: 46 });
-  const up = (label) => axis(label, { size: 54, space: 22 });
+  const up = (label) => axis(label, { size: 66, space: 22 });
   const curve = (label, name, unit, more) => ({
     label, name, stroke: () => color(name), width: 1.5, points: { size: 4 }, value: (_, v) => number(v, unit), ...more,
   });
@@ -57,7 +57,9 @@
         if (type === "pointerdown") start = event;
         const at = type === "pointercancel" && start ? start : event; // the page scrolls: nothing is selected
         const target = as[type] === "mouseup" ? document : u.over;
-        target.dispatchEvent(new MouseEvent(as[type], { clientX: at.clientX, clientY: at.clientY, bubbles: true }));
+        const mouse = new MouseEvent(as[type], { clientX: at.clientX, clientY: at.clientY, bubbles: true });
+        Object.defineProperty(mouse, "movementX", { value: 1 }); // uPlot passes over moves by nothing
+        target.dispatchEvent(mouse);
       });
     }
   }

@@ -85,7 +85,7 @@ fn words(signal: Signal) -> String {
 }
 
 fn percent(share: f64) -> String {
-    format!("{:.0} %", 100.0 * share)
+    format!("{} %", minus(&format!("{:.0}", 100.0 * share)))
 }
 
 fn notes(diagnosis: &Diagnosis, recordings: &[Recording]) -> Vec<String> {
@@ -103,7 +103,7 @@ fn recording_context(recording: &Recording, signals: &[Signal], held_out: Option
         duration => format!("{:.1}", time[samples - 1] - time[0]),
         signals => signals.iter().map(|signal| words(*signal)).collect::<Vec<_>>(),
         thinned => (samples > most).then_some(most),
-        held_out => held_out.map(|from| if from > time[0] { format!("from {from:.1} s") } else { "whole".to_owned() }),
+        held_out => held_out.map(|from| if from > time[0] { format!("from {from:.1} s") } else { "all of it".to_owned() }),
     }
 }
 
@@ -149,7 +149,7 @@ fn ranking(diagnosis: &Diagnosis) -> Vec<Value> {
             effect => ranked.effect, meaning => meaning(ranked.effect),
             named => diagnosis.causes.iter().any(|cause| cause.effect == ranked.effect),
             explained => percent(ranked.explained), width => width(ranked.explained),
-            evidence => format!("{:.0}", ranked.evidence),
+            evidence => minus(&format!("{:.0}", ranked.evidence)),
         }
     };
     diagnosis.ranking.iter().map(row).collect()
@@ -199,7 +199,15 @@ fn rounded_to(value: f64, interval: f64) -> String {
     }
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let decimals = (1.0 - interval.log10().floor()).clamp(0.0, 9.0) as usize;
-    format!("{value:.decimals$}").replace('-', "−")
+    minus(&format!("{value:.decimals$}"))
+}
+
+/// A number with a true minus sign, and none on zero.
+fn minus(number: &str) -> String {
+    match number.strip_prefix('-') {
+        Some(zero) if zero.chars().all(|c| matches!(c, '0' | '.')) => zero.to_owned(),
+        _ => number.replace('-', "−"),
+    }
 }
 
 fn three_digits(value: f64) -> String {
@@ -263,6 +271,7 @@ mod tests {
         assert_eq!(rounded_to(12.3456, 0.4), "12.35");
         assert_eq!(rounded_to(1234.5, 300.0), "1234");
         assert_eq!(rounded_to(0.5, 0.0), "0.5");
+        assert_eq!(rounded_to(-0.0004, 0.1), "0.00");
         assert_eq!(three_digits(0.012_345), "0.0123");
     }
 }
