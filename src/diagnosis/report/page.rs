@@ -5,7 +5,7 @@ use super::exposure::{Exposed, Residuals, SEEN};
 use super::{Made, display_unit, gain, headline, pictures};
 use crate::Result;
 use crate::diagnosis::links::Variable;
-use crate::diagnosis::{Cause, Diagnosis, FittedParameter, Verdict};
+use crate::diagnosis::{Cause, Diagnosis, FittedParameter, Ranked, SignalErrors, Verdict};
 use crate::effects::Effects;
 use crate::measurement::{Recording, Signal};
 use crate::package::{render, short};
@@ -133,7 +133,7 @@ fn meaning(effect: &str) -> &'static str {
     Effects::DESCRIPTIONS.iter().find(|known| known.name == effect).map_or("", |known| known.meaning)
 }
 
-fn errors_context(errors: &crate::diagnosis::SignalErrors) -> Value {
+fn errors_context(errors: &SignalErrors) -> Value {
     let (unit, size) = display_unit(errors.signal);
     let largest = errors.nominal_rms.max(errors.extended_rms).max(errors.noise_rms);
     let shown = |rms: f64| context! { text => three_digits(rms / size), width => width(rms / largest) };
@@ -144,7 +144,7 @@ fn errors_context(errors: &crate::diagnosis::SignalErrors) -> Value {
 }
 
 fn ranking(diagnosis: &Diagnosis) -> Vec<Value> {
-    let row = |ranked: &crate::diagnosis::Ranked| {
+    let row = |ranked: &Ranked| {
         context! {
             effect => ranked.effect, meaning => meaning(ranked.effect),
             named => diagnosis.causes.iter().any(|cause| cause.effect == ranked.effect),
@@ -195,7 +195,7 @@ fn parameter_unit(parameter: &FittedParameter) -> (String, f64) {
 /// A value to as many decimals as an interval around it deserves: two significant digits of its width.
 fn rounded_to(value: f64, interval: f64) -> String {
     if !(interval > 0.0 && interval.is_finite()) {
-        return short(value);
+        return minus(&short(value));
     }
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let decimals = (1.0 - interval.log10().floor()).clamp(0.0, 9.0) as usize;
@@ -244,6 +244,7 @@ fn next_measurements(diagnosis: &Diagnosis, recordings: &[Recording]) -> Vec<Str
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::Remaining;
 
     #[test]
     fn nothing_in_the_data_ends_the_script() {
@@ -253,10 +254,69 @@ mod tests {
         assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap()["name"], nasty);
     }
 
+    /// A diagnosis that holds everything the page can show.
+    fn everything(verdict: Verdict, causes: Vec<Cause>) -> Diagnosis {
+        let correction = FittedParameter { name: "muscle.area_scale", value: 1.01, low: 1.0, high: 1.02, unit: "1" };
+        Diagnosis {
+            verdict,
+            causes,
+            signals: vec![SignalErrors { signal: Signal::Force, nominal_rms: 20.0, extended_rms: 2.0, noise_rms: 1.0 }],
+            improvement: 0.9,
+            held_out: "<i>.csv from 6.0 s".to_owned(),
+            ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2 }],
+            extended: Parameters::default(),
+            corrections: vec![correction],
+            notes: vec!["<b>bold</b>".to_owned()],
+            remaining: vec![Remaining { signal: Signal::Force, on: "speed & pressure".to_owned(), share: 0.43 }],
+        }
+    }
+
+    fn page_of(diagnosis: &Diagnosis) -> String {
+        let wave = |k: usize| (0.1 * k as f64).sin();
+        let rows =
+            (0..100).map(|k| format!("{},2e5,{},{}\n", 0.1 * k as f64, 80.0 + 20.0 * wave(k), 900.0 + 200.0 * wave(k)));
+        let text = format!("time [s],gauge_pressure [Pa],contraction [mm],force [N]\n{}", rows.collect::<String>());
+        let recording = Recording::parse(text.as_bytes(), std::path::Path::new("<i>.csv"), &[]).unwrap();
+        html(diagnosis, &Parameters::default(), &[recording], &[]).unwrap()
+    }
+
+    #[test]
+    fn page_tells_alternatives_what_is_left_and_what_to_measure() {
+        let cause = Cause {
+            effect: "payload_mass",
+            sentence: "The load is 2 kg heavier.".to_owned(),
+            parameters: Vec::new(),
+            alternatives: vec!["valve_lag"],
+            experiment: "a second load",
+        };
+        let page = page_of(&everything(Verdict::Ambiguous, vec![cause]));
+        for words in [
+            "This data cannot tell <code>payload_mass</code> from",
+            "An experiment that can: a second load.",
+            "To tell payload_mass from valve_lag: a second load.",
+            "Of what is left in force, 43 % goes with speed &amp; pressure.",
+            "&lt;b&gt;bold&lt;",
+            "Held out from the fits: from 6.0 s",
+            "<td class=\"n\">0 %</td><td class=\"n\">−3</td>",
+        ] {
+            assert!(page.contains(words), "{words}");
+        }
+        assert!(!page.contains("<b>") && !page.contains("<i>"));
+    }
+
+    #[test]
+    fn page_of_an_unknown_cause_shows_where_it_is_seen() {
+        let seen = "Where the error shows best";
+        assert!(page_of(&everything(Verdict::Unexplained, Vec::new())).contains(seen));
+        assert!(!page_of(&everything(Verdict::Nominal, Vec::new())).contains(seen));
+    }
+
     #[test]
     fn parameters_are_in_units_for_people() {
-        let parameter =
-            |name, value: f64, unit| FittedParameter { name, value, low: 0.98 * value, high: 1.02 * value, unit };
+        let parameter = |name, value: f64, unit| {
+            let half = 0.02 * value.abs();
+            FittedParameter { name, value, low: value - half, high: value + half, unit }
+        };
         let shown = |parameter: &FittedParameter| {
             let (unit, size) = parameter_unit(parameter);
             format!("{} {unit}", rounded_to(parameter.value / size, (parameter.high - parameter.low) / size))
