@@ -7,6 +7,7 @@
 //! nothing is wrong, or that the cause is unknown.
 
 mod candidates;
+mod links;
 mod noise;
 pub mod report;
 mod residuals;
@@ -83,6 +84,17 @@ pub struct Ranked {
     pub evidence: f64,
 }
 
+/// What the error that is left goes with.
+#[derive(Debug, Clone)]
+pub struct Remaining {
+    /// The signal.
+    pub signal: Signal,
+    /// Which variable or variables, in words.
+    pub on: String,
+    /// Share of the error that is left in this signal, from 0 to 1.
+    pub share: f64,
+}
+
 /// The answer.
 #[derive(Debug, Clone)]
 pub struct Diagnosis {
@@ -102,6 +114,10 @@ pub struct Diagnosis {
     pub extended: Parameters,
     /// Corrections of the nominal model that were fitted along.
     pub corrections: Vec<FittedParameter>,
+    /// What a person should know about the input.
+    pub notes: Vec<String>,
+    /// What the error that is left goes with.
+    pub remaining: Vec<Remaining>,
 }
 
 /// Diagnoses recordings against a nominal model.
@@ -170,6 +186,8 @@ fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnos
         ranking: chosen.singles.iter().map(baseline).collect(),
         extended,
         corrections,
+        notes: Vec::new(),
+        remaining: Vec::new(),
     })
 }
 
