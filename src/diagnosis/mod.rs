@@ -8,6 +8,7 @@
 
 mod candidates;
 mod noise;
+pub mod plan;
 pub mod report;
 mod residuals;
 mod selection;
@@ -17,8 +18,9 @@ pub use candidates::FittedParameter;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::simulation::replay;
+use crate::variables::Declared;
 use crate::{Error, Result};
-use candidates::Bench;
+use candidates::{Bench, Fitted};
 use residuals::Data;
 use residuals::Scope;
 use selection::{Chosen, Judged, Search};
@@ -55,9 +57,14 @@ pub struct Cause {
     pub parameters: Vec<FittedParameter>,
     /// Effects that this data cannot tell from it.
     pub alternatives: Vec<&'static str>,
-    /// The experiment that would.
+    /// Their fits: what each model with one of them in place of the named one changes of the nominal model.
+    pub rivals: Vec<(&'static str, Values)>,
+    /// The experiment that would tell them apart.
     pub experiment: &'static str,
 }
+
+/// Parameters with their values, SI.
+pub type Values = Vec<(&'static str, f64)>;
 
 /// Errors of one signal on samples that no fit saw, in its SI unit.
 #[derive(Debug, Clone, Copy)]
@@ -81,6 +88,8 @@ pub struct Ranked {
     pub explained: f64,
     /// Evidence for the effect (natural logarithm, at the effective number of samples).
     pub evidence: f64,
+    /// What its fit changes of the nominal model.
+    pub parameters: Values,
 }
 
 /// The answer.
@@ -160,10 +169,11 @@ fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnos
         effect: judged.fitted.hypothesis.parts[0].effect.name,
         explained: judged.explained,
         evidence: judged.evidence,
+        parameters: changes(nominal, &judged.fitted.parameters),
     };
     Some(Diagnosis {
         verdict: chosen.verdict,
-        causes: causes(&chosen, &parameters),
+        causes: causes(&chosen, nominal, &parameters),
         signals: signals.collect(),
         improvement: if before > 0.0 { 1.0 - after / before } else { 0.0 },
         held_out: data.held_out(),
@@ -174,7 +184,7 @@ fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnos
 }
 
 /// The causes as they are told, the largest first.
-fn causes(chosen: &Chosen, parameters: &[FittedParameter]) -> Vec<Cause> {
+fn causes(chosen: &Chosen, nominal: &Parameters, parameters: &[FittedParameter]) -> Vec<Cause> {
     let parts = chosen.model.hypothesis.parts.iter().zip(&chosen.alternatives);
     let causes = parts.map(|(part, alternatives)| {
         let effect = part.effect;
@@ -184,8 +194,38 @@ fn causes(chosen: &Chosen, parameters: &[FittedParameter]) -> Vec<Cause> {
             sentence: chosen.model.parameters.effects.sentence(effect.name).unwrap_or_default(),
             parameters: parameters.iter().filter(own).cloned().collect(),
             alternatives: alternatives.clone(),
+            rivals: rivals(chosen, nominal, effect.name, alternatives),
             experiment: effect.experiment,
         }
     });
     causes.collect()
+}
+
+/// The fits with each of the alternatives in the place of a named effect.
+fn rivals(
+    chosen: &Chosen,
+    nominal: &Parameters,
+    effect: &str,
+    alternatives: &[&'static str],
+) -> Vec<(&'static str, Values)> {
+    let others: Vec<_> = chosen.model.hypothesis.names().into_iter().filter(|name| *name != effect).collect();
+    let fit_with = |name: &'static str| {
+        let stands_in = |rival: &&Fitted| rival.hypothesis.has(name) && others.iter().all(|o| rival.hypothesis.has(o));
+        let rival = chosen.rivals.iter().find(stands_in)?;
+        Some((name, changes(nominal, &rival.parameters)))
+    };
+    alternatives.iter().filter_map(|name| fit_with(name)).collect()
+}
+
+/// The parameters of a model that differ from the nominal ones.
+fn changes(nominal: &Parameters, model: &Parameters) -> Values {
+    let (mut before, mut changes) = (Vec::new(), Vec::new());
+    nominal.visit(&mut |_, value| before.push(value));
+    let mut before = before.into_iter();
+    model.visit(&mut |variable, value| {
+        if before.next() != Some(value) {
+            changes.push((variable.name, value));
+        }
+    });
+    changes
 }

@@ -2,6 +2,7 @@
 
 use super::{Diagnosis, FittedParameter, Verdict};
 use crate::Result;
+use crate::effects::Effects;
 use crate::measurement::{Recording, Signal};
 use crate::models::models;
 use crate::package::{Library, fmu, render, short};
@@ -53,6 +54,9 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         let entry = |p: &FittedParameter| json!({ "value": p.value, "low": p.low, "high": p.high, "unit": p.unit });
         all.iter().map(|p| (p.name.to_owned(), entry(p))).collect()
     };
+    let values = |all: &[(&str, f64)]| -> Map<String, Value> {
+        all.iter().map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
+    };
     let causes: Vec<Value> = diagnosis
         .causes
         .iter()
@@ -62,6 +66,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
                 "sentence": cause.sentence,
                 "parameters": parameters(&cause.parameters),
                 "alternatives": cause.alternatives,
+                "rivals": cause.rivals.iter().map(|(n, v)| ((*n).to_owned(), json!(values(v)))).collect::<Map<_, _>>(),
             })
         })
         .collect();
@@ -81,7 +86,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
     let ranking: Vec<Value> = diagnosis
         .ranking
         .iter()
-        .map(|r| json!({ "effect": r.effect, "explained": r.explained, "evidence": r.evidence }))
+        .map(|r| json!({ "effect": r.effect, "explained": r.explained, "evidence": r.evidence, "parameters": values(&r.parameters) }))
         .collect();
     json!({
         "verdict": diagnosis.verdict,
@@ -95,8 +100,17 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
     })
 }
 
-fn separating_experiment(diagnosis: &Diagnosis) -> Option<&'static str> {
-    diagnosis.causes.iter().find(|cause| !cause.alternatives.is_empty()).map(|cause| cause.experiment)
+/// What would tell the first ambiguous cause from its alternatives: the experiments that show each of them.
+fn separating_experiment(diagnosis: &Diagnosis) -> Option<String> {
+    let cause = diagnosis.causes.iter().find(|cause| !cause.alternatives.is_empty())?;
+    let shown_by = |name: &str| Effects::DESCRIPTIONS.iter().find(|e| e.name == name).map(|e| e.experiment);
+    let mut experiments = vec![cause.experiment];
+    for experiment in cause.alternatives.iter().filter_map(|name| shown_by(name)) {
+        if !experiments.contains(&experiment) {
+            experiments.push(experiment);
+        }
+    }
+    Some(experiments.join("; and "))
 }
 
 /// All files of a diagnosis, as paths in `folder` with their bytes.
