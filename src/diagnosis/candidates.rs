@@ -94,7 +94,7 @@ impl Hypothesis {
     }
 }
 
-fn declared(parameters: &Parameters, name: &str) -> (&'static Variable, f64) {
+pub(super) fn declared(parameters: &Parameters, name: &str) -> (&'static Variable, f64) {
     parameters.find(name).unwrap_or_else(|| panic!("`{name}` is declared"))
 }
 
@@ -108,7 +108,7 @@ pub fn neutralised(parameters: &Parameters, effect: &Description) -> Parameters 
 }
 
 /// Parameters with some of them set.
-fn with_values(base: &Parameters, variables: &[&'static Variable], values: &[f64]) -> Parameters {
+pub(super) fn with_values(base: &Parameters, variables: &[&'static Variable], values: &[f64]) -> Parameters {
     let mut parameters = *base;
     parameters.visit_mut(&mut |variable, old| {
         variables.iter().position(|free| free.name == variable.name).map_or(old, |k| values[k])
@@ -142,6 +142,25 @@ pub struct Start {
     pub parameters: Parameters,
 }
 
+/// Corrections that every fit may make of a nominal model that is good to `tolerance`, with their bounds and priors.
+pub fn corrections(nominal: &Parameters, tolerance: f64) -> Vec<(&'static Variable, Free)> {
+    let relative = COEFFICIENTS.iter().filter_map(|name| {
+        let (variable, start) = declared(nominal, name);
+        let size = tolerance * start.abs();
+        // The deviation of a uniform distribution over the tolerance.
+        let prior = Some((start, size / 3.0_f64.sqrt()));
+        let bounds = Free { start, lower: start - size, upper: start + size, typical: size, prior };
+        (size > 0.0).then_some((variable, bounds))
+    });
+    let shapes = SHAPES.iter().map(|name| {
+        let (variable, start) = declared(nominal, name);
+        let size = SHAPE_SHARE * tolerance;
+        let (lower, upper) = (start - 3.0 * size, start + 3.0 * size);
+        (variable, Free { start, lower, upper, typical: size, prior: Some((start, size)) })
+    });
+    relative.chain(shapes).collect()
+}
+
 /// What fits of all hypotheses have in common.
 pub struct Bench<'a> {
     /// The recordings.
@@ -157,21 +176,7 @@ pub struct Bench<'a> {
 impl<'a> Bench<'a> {
     /// Prepares fits of a nominal model that is good to `tolerance`.
     pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64) -> Self {
-        let relative = COEFFICIENTS.iter().filter_map(|name| {
-            let (variable, start) = declared(nominal, name);
-            let size = tolerance * start.abs();
-            // The deviation of a uniform distribution over the tolerance.
-            let prior = Some((start, size / 3.0_f64.sqrt()));
-            let bounds = Free { start, lower: start - size, upper: start + size, typical: size, prior };
-            (size > 0.0).then_some((variable, bounds))
-        });
-        let shapes = SHAPES.iter().map(|name| {
-            let (variable, start) = declared(nominal, name);
-            let size = SHAPE_SHARE * tolerance;
-            let (lower, upper) = (start - 3.0 * size, start + 3.0 * size);
-            (variable, Free { start, lower, upper, typical: size, prior: Some((start, size)) })
-        });
-        let corrections = relative.chain(shapes).collect();
+        let corrections = corrections(nominal, tolerance);
         let weights = data.weights(Scope::All);
         Self { data, nominal, corrections, slopes: Vec::new(), weights }
     }
@@ -364,7 +369,7 @@ impl<'a> Bench<'a> {
 }
 
 /// Bounds of parameters of effects; a change of the size of the start matters.
-fn bounds(variables: &[&'static Variable], start: &Parameters) -> Vec<Free> {
+pub(super) fn bounds(variables: &[&'static Variable], start: &Parameters) -> Vec<Free> {
     let bounds = |variable: &&'static Variable| {
         let start = declared(start, variable.name).1;
         let span = (variable.max - variable.min).min(2.0 * variable.unit.nominal);

@@ -239,7 +239,9 @@ impl<'a> Chain<'a> {
 
     fn true_contraction(&self) -> Option<Vec<f64>> {
         let readings = self.recording.bridged(Signal::Contraction)?;
-        Some(readings.into_iter().map(|reading| self.parameters.effects.true_contraction(reading)).collect())
+        let pull = self.recording.bridged(Signal::Force).unwrap_or_else(|| vec![0.0; readings.len()]);
+        let both = readings.into_iter().zip(pull);
+        Some(both.map(|(reading, pull)| self.parameters.effects.true_contraction(reading, pull)).collect())
     }
 }
 

@@ -54,6 +54,8 @@ pub struct Chosen {
     pub model: Fitted,
     /// Per effect of the model, in its order: effects that could stand in its place.
     pub alternatives: Vec<Vec<&'static str>>,
+    /// The hypotheses with these effects in their place.
+    pub rivals: Vec<Fitted>,
     /// Single effects, the best first.
     pub singles: Vec<Judged>,
 }
@@ -306,7 +308,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let singles = levels[0].clone();
         let refused = |verdict| {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
-            Some(Chosen { verdict, model, alternatives: Vec::new(), singles: singles.clone() })
+            Some(Chosen { verdict, model, alternatives: Vec::new(), rivals: Vec::new(), singles: singles.clone() })
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
         let Some(best) = self.best(&levels) else { return refused(wrong) };
@@ -325,7 +327,8 @@ impl<'a, 'b> Search<'a, 'b> {
             Verdict::PartlyExplained
         };
         let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
-        Some(Chosen { verdict, model, alternatives, singles })
+        let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
+        Some(Chosen { verdict, model, alternatives, rivals, singles })
     }
 
     /// Whether a hypothesis, fitted to the samples that fits may see, does better on those that they may not.

@@ -10,6 +10,9 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         let entry = |p: &FittedParameter| json!({ "value": p.value, "low": p.low, "high": p.high, "unit": p.unit });
         all.iter().map(|p| (p.name.to_owned(), entry(p))).collect()
     };
+    let values = |all: &[(&str, f64)]| -> Map<String, Value> {
+        all.iter().map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
+    };
     let causes: Vec<Value> = diagnosis
         .causes
         .iter()
@@ -19,6 +22,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
                 "sentence": cause.sentence,
                 "parameters": parameters(&cause.parameters),
                 "alternatives": cause.alternatives,
+                "rivals": cause.rivals.iter().map(|(n, v)| ((*n).to_owned(), json!(values(v)))).collect::<Map<_, _>>(),
             })
         })
         .collect();
@@ -38,7 +42,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
     let ranking: Vec<Value> = diagnosis
         .ranking
         .iter()
-        .map(|r| json!({ "effect": r.effect, "explained": r.explained, "evidence": r.evidence }))
+        .map(|r| json!({ "effect": r.effect, "explained": r.explained, "evidence": r.evidence, "parameters": values(&r.parameters) }))
         .collect();
     let remaining: Vec<Value> = diagnosis
         .remaining

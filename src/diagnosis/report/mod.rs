@@ -13,6 +13,7 @@ pub use simulated::simulated_csv;
 
 use super::{Diagnosis, Verdict};
 use crate::Result;
+use crate::effects::Effects;
 use crate::measurement::{Recording, Signal};
 use crate::models::models;
 use crate::package::{Library, fmu};
@@ -54,8 +55,16 @@ pub fn gain(diagnosis: &Diagnosis) -> String {
 }
 
 /// The experiment that tells a cause from its alternatives; `None` where none is needed.
-fn separating_experiment(diagnosis: &Diagnosis) -> Option<&'static str> {
-    diagnosis.causes.iter().find(|cause| !cause.alternatives.is_empty()).map(|cause| cause.experiment)
+fn separating_experiment(diagnosis: &Diagnosis) -> Option<String> {
+    let cause = diagnosis.causes.iter().find(|cause| !cause.alternatives.is_empty())?;
+    let shown_by = |name: &str| Effects::DESCRIPTIONS.iter().find(|e| e.name == name).map(|e| e.experiment);
+    let mut experiments = vec![cause.experiment];
+    for experiment in cause.alternatives.iter().filter_map(|name| shown_by(name)) {
+        if !experiments.contains(&experiment) {
+            experiments.push(experiment);
+        }
+    }
+    Some(experiments.join("; and "))
 }
 
 /// A file of a diagnosis.
