@@ -1,8 +1,8 @@
 """How small an effect may be and still be named: the share of cases against size, per effect.
 
     python detection.py --sinew ../../target/release/sinew --seed 9500 --cases 6 --out detection
-    python detection.py --sinew … --seed 9501 --cases 6 --out detection --effects creep,leakage    # adds to what is there
-    python detection.py --out detection                                                           # draws it again
+    python detection.py --sinew … --seed 9501 --cases 6 --out detection --effects creep,leakage  # adds to what is there
+    python detection.py --out detection                                                         # draws it again
 
 `cases.csv` in the folder keeps one line per case. What is there already is not done again, so that it may be stopped,
 and run in pieces with other seeds, effects and sizes. `detection.csv` and `detection.svg` are made from all lines.
