@@ -4,8 +4,8 @@
 
 Plain scipy (fit.py): every effect of a textbook library fitted by least squares on simulation error, the lowest BIC
 has the name. pysindy (sindy.py): sparse regression of the residuals on terms that stand for the effects. Both know the
-nominal model and its tolerance, and get the same files as the tool; they compare readings at 50 Hz. Needs, beyond
-tests/requirements.txt: pip install pysindy numba
+nominal model and its tolerance, and get the same files as the tool, of which they use 50 and 20 samples per second.
+Needs, beyond tests/requirements.txt: pip install pysindy numba
 """
 
 import argparse
@@ -79,7 +79,10 @@ def compare(folder, names, sinew):
     for title, name in PLAIN.items():
         for outcome, answer in zip(outcomes, name_plainly(name, folder, names), strict=True):
             ways[title].add(outcome.truth, *answer)
-            print(f"{outcome.name} {outcome.truth}/{'+'.join(outcome.detail['forms'])}: {title} says {answer[0]}")
+            print(
+                f"{outcome.name} {outcome.truth}/{'+'.join(outcome.detail['forms'])}: {title} says {answer[0]}",
+                flush=True,
+            )
     return ways, details(outcomes, ways)
 
 

@@ -12,7 +12,7 @@ from numba import njit
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import least_squares
 
-STEP = 1e-3
+STEP = 2e-3
 SETTLE = 2.5  # s of rest, strongly damped, before the recording starts
 RATE = 50  # Hz, at which readings are compared
 TOLERANCE = 0.03
@@ -115,7 +115,7 @@ def read(path):
     outputs = {"gauge_pressure", "force"} | (set() if driven else {"contraction"})
     if driven and "command" not in columns:
         outputs.discard("gauge_pressure")
-    measured = {name: columns[name][::every] for name in outputs if name in columns}
+    measured = {name: columns[name][::every] for name in sorted(outputs) if name in columns}
     return Recording(
         times[::every],
         on_grid("command") if "command" in columns else None,
@@ -295,7 +295,7 @@ def fit(recordings, effect=None, nominal=None):
             first,
             bounds=(low, high),
             x_scale=scale,
-            max_nfev=30,
+            max_nfev=15,
             diff_step=1e-4,
         )
         if best is None or found.cost < best.cost:

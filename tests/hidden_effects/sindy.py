@@ -1,4 +1,4 @@
-"""Sparse regression: pysindy picks the terms that the model's residuals consist of; the largest has the name.
+"""Sparse regression: pysindy picks the terms that the model's residuals consist of; what counts most has the name.
 
 The residuals of two links of the chain, pressure after command and force after pressure and contraction, and of the
 weighed load against the force sensor, stand below each other in one regression. Every term is the change that a small
@@ -13,13 +13,14 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
+import fit
 from fit import TOLERANCE, VALVE_RATE, area_of, elastic_of, white_noise
 
 STEP = 0.005  # s, of the grid on which is filtered and differentiated
-EVERY = 4  # of these for the regression: 50 Hz
+EVERY = 10  # of these for the regression: 20 Hz, so that neighbours have noise of their own after the smoothing
 SMOOTH = 0.02  # s, before differentiation
-THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the whole residual
-MOST_TERMS = 5
+THRESHOLDS = (0.05, 0.1, 0.2, 0.4)  # of the whole residual
+MOST_TERMS = 5  # more, and they cancel each other: that is no explanation
 
 
 def first_order(series, time):
@@ -46,7 +47,7 @@ class Signals:
         self.load = self.mass * (9.81 + rate(self.v)) if self.mass else None
 
     def _on_grid(self, series):
-        return np.interp(self.time, 1e-3 * np.arange(len(series)), series)
+        return np.interp(self.time, fit.STEP * np.arange(len(series)), series)
 
 
 def signals_of(recording):
@@ -152,7 +153,7 @@ def stacked(recordings):
 
 
 def name_by_sindy(recordings):
-    """The effect whose terms make up most of the best sparse model, with those that have the same term.
+    """The effect whose terms the best sparse model can spare least, with those that have the same term.
 
     None where no term is worth its parameter.
     """
@@ -162,13 +163,17 @@ def name_by_sindy(recordings):
     left /= np.linalg.norm(left)
     library, owners = distinct(columns)
     best = min(sparse_models(library, left), key=lambda weights: bic(library, left, weights))
-    if not best.any():
-        return ()
-    parts = {}
-    for owner in set(owners):
-        own = np.array([one == owner for one in owners])
-        parts[owner] = np.linalg.norm(library[:, own] @ best[own])
-    return max(parts, key=parts.get)
+    chosen = {owners[k] for k in np.flatnonzero(best)}
+    return max(chosen, key=lambda owner: squares_without(owner, library, left, best, owners), default=())
+
+
+def squares_without(owner, library, left, weights, owners):
+    """Sum of squares if an effect's terms are taken out, the others fitted anew.
+
+    Terms that are alike have large weights of opposite signs, so that these say nothing of what a term is worth.
+    """
+    kept = library[:, [k for k in np.flatnonzero(weights) if owners[k] != owner]]
+    return np.sum((left - kept @ np.linalg.lstsq(kept, left)[0]) ** 2)
 
 
 def distinct(columns):
@@ -189,9 +194,9 @@ def distinct(columns):
 
 
 def sparse_models(library, left):
-    """Weights from thresholded least squares and from forward selection, of several sparsities; and none at all."""
+    """Weights from thresholded least squares and from forward selection, of few terms; and none at all."""
     thresholded = [pysindy.STLSQ(threshold=threshold, alpha=1e-4) for threshold in THRESHOLDS]
-    forward = [pysindy.FROLS(max_iter=count, alpha=1e-6) for count in range(1, MOST_TERMS + 1)]
+    forward = [pysindy.FROLS(max_iter=count, alpha=1e-6) for count in (1, 2, 3, MOST_TERMS)]
     models = [np.zeros(library.shape[1])]
     for optimizer in thresholded + forward:
         model = pysindy.SINDy(optimizer=optimizer, feature_library=pysindy.IdentityLibrary())
@@ -201,7 +206,9 @@ def sparse_models(library, left):
                 model.fit(library, t=STEP * EVERY, x_dot=left[:, None])
         except ValueError:  # terms that depend on each other, to the last digits
             continue
-        models.append(model.coefficients()[0])
+        weights = model.coefficients()[0]
+        if np.count_nonzero(weights) <= MOST_TERMS:
+            models.append(weights)
     return models
 
 
