@@ -2,7 +2,7 @@
 
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::{Description, Freed};
-use crate::least_squares::{self, Effort, Ended, Free, derivatives, normal_matrix};
+use crate::least_squares::{self, Effort, Ended, Free, derivatives, linear_decrease, normal_matrix};
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
 use nalgebra::DMatrix;
@@ -295,15 +295,7 @@ impl<'a> Bench<'a> {
             free.push(Free { start: 0.0, lower: -size, upper: size, prior: None, ..*correction });
             columns.push(weighted(slope, &self.weights));
         }
-        let changed = |values: &[f64]| {
-            let mut changed = residuals.to_vec();
-            for (value, column) in values.iter().zip(&columns) {
-                changed.iter_mut().zip(column).for_each(|(r, slope)| *r += value * slope);
-            }
-            Some(changed)
-        };
-        let fit = least_squares::fit(&changed, &free, &columns, ROUGH);
-        1.0 - fit.cost / residuals.iter().map(|r| r * r).sum::<f64>()
+        linear_decrease(residuals, &columns, &free) / residuals.iter().map(|r| r * r).sum::<f64>()
     }
 
     fn everything_free(&self, hypothesis: &Hypothesis, start: &Parameters) -> (Vec<&'static Variable>, Vec<Free>) {

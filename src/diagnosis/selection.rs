@@ -16,12 +16,12 @@ const RIVAL: f64 = 3.0;
 /// did not see.
 const LEAST_EXPLAINED: (f64, f64) = (0.9, 0.8);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
-const LEAST_FURTHER: f64 = 0.6;
+const LEAST_FURTHER: f64 = 0.9;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
-/// Share of a signal's error that a named effect may leave without a further effect being looked for: a twentieth of its
+/// Share of a signal's error that a named effect may leave without a further effect being looked for: a seventh of its
 /// rms is how the form of an effect differs from the true one.
-const LEFT_BY_FORM: f64 = 0.0025;
+const LEFT_BY_FORM: f64 = 0.02;
 /// How many times the structural error of a sound model an error must be to be called unexplained.
 const UNEXPLAINED: f64 = 4.0;
 /// Hypotheses that are carried on at each number of effects.
@@ -29,7 +29,7 @@ const BEAM: usize = 3;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
 /// Candidates that are fitted, of those that look promising: for the first effect, and for further ones.
-const FITTED: (usize, usize) = (10, 5);
+const FITTED: (usize, usize) = (10, 7);
 /// Starts from which a candidate is fitted.
 const STARTS: usize = 2;
 
@@ -121,11 +121,15 @@ impl<'a, 'b> Search<'a, 'b> {
             self.bench.refine_noise(&residuals);
             singles = self.judged_anew(singles);
         }
+        super::residuals::count("singles");
         let mut levels = vec![self.refined_best(singles)];
+        super::residuals::count("refined");
         while levels.len() < MOST_EFFECTS && self.something_is_left(levels.last()?) {
             let next = self.next_level(levels.last()?, &starts);
             levels.push(next);
+            super::residuals::count("next");
         }
+        super::residuals::count("levels");
         self.trace(&levels);
         self.choose(levels)
     }
@@ -328,6 +332,7 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
+        super::residuals::count("chosen");
         Some(Chosen { verdict, model, alternatives, rivals, singles })
     }
 
