@@ -7,6 +7,7 @@
 //! nothing is wrong, or that the cause is unknown.
 
 mod candidates;
+mod correction;
 mod noise;
 pub mod plan;
 pub mod report;
@@ -14,6 +15,7 @@ mod residuals;
 mod selection;
 
 pub use candidates::FittedParameter;
+pub use correction::Correction;
 
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
@@ -111,6 +113,8 @@ pub struct Diagnosis {
     pub extended: Parameters,
     /// Corrections of the nominal model that were fitted along.
     pub corrections: Vec<FittedParameter>,
+    /// Where the cause is unknown: a smooth correction without one, which explains nothing. No part of `extended`.
+    pub correction: Option<Correction>,
 }
 
 /// Diagnoses recordings against a nominal model.
@@ -171,8 +175,10 @@ fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnos
         evidence: judged.evidence,
         parameters: changes(nominal, &judged.fitted.parameters),
     };
+    let unexplained = chosen.verdict == Verdict::Unexplained;
     Some(Diagnosis {
         verdict: chosen.verdict,
+        correction: if unexplained { correction::correction(bench, &extended) } else { None },
         causes: causes(&chosen, nominal, &parameters),
         signals: signals.collect(),
         improvement: if before > 0.0 { 1.0 - after / before } else { 0.0 },

@@ -1,6 +1,6 @@
 //! The diagnosis as files: `diagnosis.json`, `report.html`, `extended.toml`, `simulated.csv` and the extended FMU.
 
-use super::{Diagnosis, FittedParameter, Verdict};
+use super::{Correction, Diagnosis, FittedParameter, Verdict};
 use crate::Result;
 use crate::effects::Effects;
 use crate::measurement::{Recording, Signal};
@@ -32,7 +32,9 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
         Verdict::PartlyExplained => format!("{named} Some structure is left that this does not explain."),
         Verdict::Ambiguous => format!("{named} This data cannot tell it from other causes, named below."),
         Verdict::Unexplained => {
-            "Something is wrong that no effect in the library accounts for: the cause is unknown.".to_owned()
+            let unknown = "Something is wrong that no effect in the library accounts for: the cause is unknown.";
+            let correction = diagnosis.correction.as_ref().map(Correction::sentence);
+            [unknown.to_owned()].into_iter().chain(correction).collect::<Vec<_>>().join(" ")
         }
     }
 }
@@ -96,6 +98,12 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         "held_out": diagnosis.held_out,
         "separating_experiment": separating_experiment(diagnosis),
         "corrections": parameters(&diagnosis.corrections),
+        "correction": diagnosis.correction.as_ref().map(|correction| json!({
+            "label": "cause unknown",
+            "acts_on": correction.acts_on,
+            "variables": correction.variables,
+            "improvement": correction.improvement,
+        })),
         "ranking": ranking,
     })
 }
@@ -143,7 +151,21 @@ pub fn files(
         let interface = muscle.interface();
         (folder.join(format!("{}.fmu", interface.name)), fmu(interface, extended, libraries))
     }));
+    if let Some(correction) = &diagnosis.correction {
+        files.extend(unknown_cause(correction, libraries, folder));
+    }
     Ok(files)
+}
+
+/// The model with a correction without a cause, as parameters and as FMU.
+fn unknown_cause(correction: &Correction, libraries: &[Library], folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = vec![(folder.join("unknown_cause.toml"), correction.parameters.to_toml().into_bytes())];
+    files.extend(models().into_iter().next().map(|muscle| {
+        let interface = muscle.interface();
+        let name = format!("{}-unknown-cause.fmu", interface.name);
+        (folder.join(name), fmu(interface, &correction.parameters, libraries))
+    }));
+    files
 }
 
 /// Measured against simulated over time, and the residual over the contraction, as SVG.
