@@ -141,8 +141,11 @@ fn write_types(xml: &mut Xml, interface: &Interface) -> io::Result<()> {
             let open = xml.create_element("SimpleType").with_attribute(("name", unit.quantity));
             open.write_inner_content(|xml| element(xml, "Real", attributes))?;
         }
+        let mut named = std::collections::BTreeSet::new();
         for variable in &interface.variables {
-            if let Kind::Enumeration(name, choices) = variable.declaration.kind {
+            if let Kind::Enumeration(name, choices) = variable.declaration.kind
+                && named.insert(name)
+            {
                 let open = xml.create_element("SimpleType").with_attribute(("name", name));
                 open.write_inner_content(|xml| {
                     element_with(xml, "Enumeration", |xml| {

@@ -1,6 +1,7 @@
 //! All parameters in one place: their defaults, presets, and the TOML file that people edit.
 
 use crate::controller::{Controller, FeedForward};
+use crate::correction::UnknownCause;
 use crate::effects::Effects;
 use crate::load::{Initial, Load};
 use crate::muscle::{ForceModelName, ForceModels, Muscle};
@@ -46,6 +47,16 @@ groups! {
     reference: Reference,
     /// What a real plant adds to the nominal one.
     effects: Effects,
+    /// What is added where the cause is unknown.
+    unknown_cause: UnknownCause,
+}
+
+impl Parameters {
+    /// Whether neither an effect nor a correction is at work.
+    #[inline]
+    pub fn are_nominal(&self) -> bool {
+        self.effects.are_neutral() && self.unknown_cause.is_neutral()
+    }
 }
 
 /// A named set of parameters, as the difference from the defaults.

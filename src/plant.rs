@@ -83,23 +83,24 @@ crate::variables::signals! {
 #[inline]
 fn extent(parameters: &Parameters) -> Extent {
     let effects = &parameters.effects;
-    match (effects.are_neutral(), effects.are_stateless()) {
+    match (parameters.are_nominal(), effects.are_stateless()) {
         (true, _) => Extent::Nominal,
         (false, true) => Extent::Stateless,
         (false, false) => Extent::Full,
     }
 }
 
-/// Pull of the muscle in N, with damping and effects; `own` are the states of the effects.
+/// Pull of the muscle in N, with damping, effects and correction; `own` are the states of the effects.
 #[inline]
 fn muscle_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
-    let Parameters { muscle, force_models, effects, .. } = parameters;
+    let Parameters { muscle, force_models, effects, unknown_cause, .. } = parameters;
     let pressure = effects.effective_pressure(at, at.gauge_pressure);
     let contraction = effects.effective_contraction(at, own, at.contraction);
     let of_area = effects.area_force(at, own, pressure * force_models.virtual_area(muscle, contraction));
     let elastic = effects.elastic_force(at, own, force_models.elastic_force(muscle, contraction));
     let static_force = effects.static_force(of_area + elastic);
-    effects.muscle_force(at, own, static_force - muscle.damping * at.contraction_velocity)
+    let force = effects.muscle_force(at, own, static_force - muscle.damping * at.contraction_velocity);
+    unknown_cause.force(at, force)
 }
 
 /// Pull of the muscle in N without effects.
@@ -120,7 +121,8 @@ fn commanded_pressure(parameters: &Parameters, command: f64) -> f64 {
 fn with_target(parameters: &Parameters, command: f64, at: Point, own: &[f64]) -> Point {
     let commanded_pressure = commanded_pressure(parameters, command);
     let at = Point { commanded_pressure, ..at };
-    Point { target_pressure: parameters.effects.target_pressure(&at, own, commanded_pressure), ..at }
+    let target_pressure = parameters.effects.target_pressure(&at, own, commanded_pressure);
+    Point { target_pressure: parameters.unknown_cause.target_pressure(&at, target_pressure), ..at }
 }
 
 /// Rate of the gauge pressure in Pa/s.
@@ -173,7 +175,7 @@ pub fn holding_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
 /// As [`holding_pressure`], with the effects as they are at the start; never below ambient.
 pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) -> f64 {
     let nominal = holding_pressure(parameters, contraction, weight).max(0.0);
-    if parameters.effects.are_neutral() {
+    if parameters.are_nominal() {
         return nominal;
     }
     let lack = |gauge_pressure: f64| {
@@ -240,7 +242,7 @@ impl System for PneumaticMuscle {
         limits: LIMITS,
         source: SOURCE,
     };
-    const GROUPS: &'static [&'static str] = &["muscle", "valve", "load", "initial"];
+    const GROUPS: &'static [&'static str] = &["muscle", "valve", "load", "initial", "unknown_cause"];
     const EFFECTS: bool = true;
     const FEEDTHROUGH: &'static [Feedthrough] = &[];
     const INITIAL_INPUTS: &'static [&'static str] = &["load.external_force"];
@@ -430,7 +432,7 @@ impl System for PneumaticActuator {
         limits: LIMITS,
         source: SOURCE,
     };
-    const GROUPS: &'static [&'static str] = &["muscle", "valve", "initial"];
+    const GROUPS: &'static [&'static str] = &["muscle", "valve", "initial", "unknown_cause"];
     const EFFECTS: bool = true;
     const FEEDTHROUGH: &'static [Feedthrough] = &[
         ("muscle.force", &["muscle.contraction", "muscle.contraction_velocity"]),

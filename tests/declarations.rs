@@ -305,6 +305,25 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
 }
 
 #[test]
+fn a_correction_without_a_cause_is_neutral_until_it_acts_on_something() {
+    let course = |parameters: &Parameters| {
+        let mut model = plants().next().unwrap();
+        run(model.as_mut(), parameters, 50);
+        along_lines(model.as_mut(), 1, 50)
+    };
+    let mut set = Parameters::default();
+    for (name, value) in [("c00", 0.3), ("c12", -0.2), ("first_high", 3.0)] {
+        set.set(&format!("unknown_cause.{name}"), value).unwrap();
+    }
+    assert_eq!(course(&Parameters::default()), course(&set));
+    for place in [2.0, 3.0] {
+        let mut acting = set;
+        acting.set("unknown_cause.acts_on", place).unwrap();
+        assert_ne!(course(&set), course(&acting), "{place}");
+    }
+}
+
+#[test]
 fn every_form_of_every_effect_acts_on_the_plant() {
     let mut still = Parameters::default();
     still.initial.gauge_pressure = 2e5;

@@ -126,3 +126,29 @@ fn a_nominal_model_without_damping_is_no_trouble() {
     let damping = found.extended.get("viscous_damping.contraction").unwrap();
     assert!(damping == 0.0 || (damping - 200.0).abs() > 1e-6, "the start value is no result");
 }
+
+#[test]
+fn an_unknown_cause_gets_a_correction_and_no_name() {
+    // A rubber stop inside the muscle: from 95 mm of contraction on it pushes back with 40 N/mm.
+    let stopped = spoilt_force("prescribed_motion.csv", |contraction| -40.0 * (contraction - 95.0).max(0.0));
+    let found = diagnosis_of(&[stopped.clone()]);
+    assert_eq!((found.verdict, causes(&found)), (Verdict::Unexplained, vec![]));
+    let correction = found.correction.as_ref().unwrap();
+    assert!(correction.improvement > 0.6, "{correction:?}");
+    assert_eq!((correction.acts_on, correction.variables[0]), ("force", "contraction"));
+    let folder = Path::new("out");
+    let files = sinew::diagnosis::report::files(&found, &Parameters::default(), &[stopped], &[], folder).unwrap();
+    for name in ["unknown_cause.toml", "PneumaticMuscle-unknown-cause.fmu"] {
+        assert!(files.iter().any(|(path, bytes)| path.ends_with(name) && !bytes.is_empty()), "{name}");
+    }
+    assert!(found.extended.unknown_cause.is_neutral());
+}
+
+/// A shipped recording with a force in N added that depends on the contraction in mm.
+fn spoilt_force(name: &str, added: impl Fn(f64) -> f64) -> Recording {
+    let contraction = as_it_is(name).bridged(sinew::measurement::Signal::Contraction).unwrap();
+    recording(name, |row, column, cell| match cell.parse::<f64>() {
+        Ok(force) if column == "force" => (force + added(1e3 * contraction[row])).to_string(),
+        _ => cell.to_owned(),
+    })
+}

@@ -7,15 +7,17 @@
 //! nothing is wrong, or that the cause is unknown.
 
 mod candidates;
+mod correction;
 mod links;
 mod noise;
-mod remaining;
 pub mod plan;
+mod remaining;
 pub mod report;
 mod residuals;
 mod selection;
 
 pub use candidates::FittedParameter;
+pub use correction::Correction;
 pub use remaining::Remaining;
 
 use crate::measurement::{Recording, Signal};
@@ -119,6 +121,8 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// What the error that is left goes with.
     pub remaining: Vec<Remaining>,
+    /// Where the cause is unknown: a smooth correction without one, which explains nothing. No part of `extended`.
+    pub correction: Option<Correction>,
 }
 
 /// Diagnoses recordings against a nominal model.
@@ -181,8 +185,10 @@ fn answer(bench: &Bench, nominal: &Parameters, chosen: &Chosen, notes: Vec<Strin
         evidence: judged.evidence,
         parameters: changes(nominal, &judged.fitted.parameters),
     };
+    let unexplained = chosen.verdict == Verdict::Unexplained;
     Some(Diagnosis {
         verdict: chosen.verdict,
+        correction: if unexplained { correction::correction(bench, &extended) } else { None },
         causes: causes(chosen, nominal, &parameters),
         signals: signals.collect(),
         improvement: if before > 0.0 { 1.0 - after / before } else { 0.0 },

@@ -175,11 +175,8 @@ impl<'a> Data<'a> {
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
     /// simulated.
     pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
-        COUNT.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        let t0 = std::time::Instant::now();
         let replays: Vec<_> =
             self.recordings.par_iter().map(|recording| replay(parameters, recording).ok()).collect::<Option<_>>()?;
-        TIME.fetch_add(t0.elapsed().as_micros() as usize, std::sync::atomic::Ordering::Relaxed);
         let mut all = Vec::with_capacity(self.segments.last().map_or(0, |segment| segment.range.end));
         for segment in &self.segments {
             let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);
@@ -205,12 +202,6 @@ impl<'a> Data<'a> {
 
     /// How large residuals are, per signal and recording.
     pub fn losses(&self, residuals: &[f64], scope: Scope) -> Vec<Loss> {
-        let t0 = std::time::Instant::now();
-        let out = self.losses0(residuals, scope);
-        TIME2.fetch_add(t0.elapsed().as_micros() as usize, std::sync::atomic::Ordering::Relaxed);
-        out
-    }
-    fn losses0(&self, residuals: &[f64], scope: Scope) -> Vec<Loss> {
         let in_scope = self.segments.iter().map(|segment| {
             let level = self.noise[&segment.signal].level;
             let both = segment.samples.iter().zip(&residuals[segment.range.clone()]);
@@ -399,8 +390,3 @@ mod tests {
         assert!((30.0..200.0).contains(&worth), "{worth}");
     }
 }
-
-pub static COUNT: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
-pub static TIME: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
-pub static TIME2: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
-pub fn count(what: &str) { if std::env::var("SINEW_TRACE").is_ok() { eprintln!("@{what} {} sim {} ms loss {} ms", COUNT.load(std::sync::atomic::Ordering::Relaxed), TIME.load(std::sync::atomic::Ordering::Relaxed)/1000, TIME2.load(std::sync::atomic::Ordering::Relaxed)/1000); } }

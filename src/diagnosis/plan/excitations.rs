@@ -50,7 +50,7 @@ struct Course {
 }
 
 /// What a step takes, s: the period of the samples, so that it is one sample wide.
-const AT_ONCE: f64 = 0.01;
+const AT_ONCE: f64 = 0.02;
 
 impl Course {
     fn end(&self) -> (f64, f64) {

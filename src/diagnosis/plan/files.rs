@@ -60,6 +60,7 @@ pub fn to_json(plan: &Plan) -> Value {
         "enough": ENOUGH,
         "candidates": plan.rivals.iter().map(|rival| rival.name).collect::<Vec<_>>(),
         "sensors": plan.sensors.iter().map(|signal| signal.name()).collect::<Vec<_>>(),
+        "unseen": plan.unseen,
         "needs": plan.needs.iter().map(|need| need.words()).collect::<Vec<_>>(),
         "recordings": runs.collect::<Vec<_>>(),
         "pairs": plan.pairs.iter().map(pairs).collect::<Vec<_>>(),
@@ -68,7 +69,7 @@ pub fn to_json(plan: &Plan) -> Value {
 }
 
 /// λ of all pairs as a table of text: of few models the numbers; of many their powers of ten, a dot where a pair is not
-/// told apart.
+/// told apart, and no line for what is not seen.
 pub fn matrix(plan: &Plan) -> String {
     let names: Vec<&str> = plan.rivals.iter().map(|rival| rival.name).collect();
     let lambda = |a: &str, b: &str| {
@@ -80,6 +81,7 @@ pub fn matrix(plan: &Plan) -> String {
             plan.pairs.iter().map(|pair| format!("  {:<50} {:.3e}\n", pair.effects.join(" from "), pair.lambda));
         return lines.collect();
     }
+    let names: Vec<&str> = names.into_iter().filter(|name| !plan.unseen.contains(name)).collect();
     let mut text = String::new();
     for (k, row) in names.iter().enumerate() {
         let cells: Vec<String> = names[..k]

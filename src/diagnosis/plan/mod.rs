@@ -3,7 +3,7 @@
 //! # Method
 //! A library of courses of the command, with the loads there are, with a further load and at locked length, is simulated
 //! under every remaining model, within the limits of the rig. Of each experiment λ says how far the rivals stay apart
-//! (see `power.rs`); the experiment whose worst pair is told apart best is proposed. Where none reaches
+//! (see `power.rs`); the experiment whose worst pair is told apart best per second is proposed. Where none reaches
 //! [`ENOUGH`], what the rig lacks is named: a second load, a sensor, a clamp, a valve that shuts.
 
 mod excitations;
@@ -177,6 +177,8 @@ pub struct Plan {
     pub compared: Vec<Compared>,
     /// How far apart each pair is then, the closest first.
     pub pairs: Vec<Pair>,
+    /// Effects of usual size that these sensors do not show at all.
+    pub unseen: Vec<&'static str>,
 }
 
 impl Plan {
@@ -197,6 +199,9 @@ impl Plan {
         if !self.needs.is_empty() {
             let needs: Vec<String> = self.needs.iter().map(|need| need.words()).collect();
             text += &format!(" This takes {}: without, no experiment of the library is enough.", needs.join(" and "));
+        }
+        if !self.unseen.is_empty() {
+            text += &format!(" Not seen by these sensors: {}.", self.unseen.join(", "));
         }
         let confused: Vec<String> = self.confused().map(|pair| pair.effects.join(" from ")).collect();
         if !confused.is_empty() && self.rivals.len() <= FEW_RIVALS {
@@ -334,21 +339,25 @@ impl Choice {
             _ => None,
         }));
         let possible = experiments.iter().filter(|e| e.needs.iter().all(|need| needs.contains(need)));
-        let mut screened: Vec<(&Experiment, DMatrix<f64>)> =
-            possible.map(|experiment| (experiment, bank.screened(&experiment.runs, &sensors))).collect();
-        screened.sort_by(|a, b| better(&a.1, &b.1));
+        let screened = possible.map(|experiment| Screened {
+            experiment,
+            duration: experiment.runs.iter().map(|run| bank.runs[*run].duration()).sum(),
+            lambda: bank.screened(&experiment.runs, &sensors),
+        });
+        let mut screened: Vec<Screened> = screened.collect();
+        screened.sort_by(order);
         screened.truncate(REPORTED);
         // Only what promises something is worth the fits.
-        let promising = screened.first().is_some_and(|(_, lambda)| told_apart(lambda) > 0);
+        let promising = screened.first().is_some_and(|best| told_apart(&best.lambda) > 0);
         if promising && task.rivals.len() <= FEW_RIVALS {
-            for (experiment, lambda) in screened.iter_mut().take(FITTED) {
-                *lambda = bank.fitted(&experiment.runs, &sensors);
+            screened.truncate(FITTED);
+            for promising in &mut screened {
+                promising.lambda = bank.fitted(&promising.experiment.runs, &sensors);
             }
-            screened.truncate(FITTED.max(1));
-            screened.sort_by(|a, b| better(&a.1, &b.1));
+            screened.sort_by(order);
         }
-        let rows = screened.iter().map(|(experiment, lambda)| compared(bank, experiment, lambda)).collect();
-        let (experiment, lambda) = screened.into_iter().next()?;
+        let rows = screened.iter().map(|screened| screened.row(bank)).collect();
+        let Screened { experiment, lambda, .. } = screened.into_iter().next()?;
         Some(Self { needs, sensors, experiment: experiment.clone(), lambda, rows })
     }
 
@@ -361,11 +370,15 @@ impl Choice {
                 file: if several { format!("plan-{}.csv", k + 1) } else { "plan.csv".to_owned() },
                 excitation: run.excitation,
                 place: run.place,
-                time: run.recording.time.clone(),
-                command: input(Signal::Command).unwrap_or_default(),
+                time: halved(&run.recording.time),
+                command: halved(&input(Signal::Command).unwrap_or_default()),
                 locked: input(Signal::Contraction).map(|contraction| contraction[0]),
             }
         });
+        // Models that a diagnosis left have been seen.
+        let usual = task.rivals.iter().zip(bank.seen(&self.experiment.runs, &self.sensors));
+        let unseen = usual.filter(|(rival, lambda)| !rival.variants.is_empty() && *lambda < ENOUGH);
+        let unseen = unseen.map(|(rival, _)| rival.name).collect();
         let mut pairs: Vec<Pair> = worst_pairs(&self.lambda)
             .map(|(a, b, lambda)| Pair { effects: [task.rivals[a].name, task.rivals[b].name], lambda })
             .collect();
@@ -378,17 +391,34 @@ impl Choice {
             runs: runs.collect(),
             compared: self.rows,
             pairs,
+            unseen,
         }
     }
 }
 
-fn compared(bank: &Bank, experiment: &Experiment, lambda: &DMatrix<f64>) -> Compared {
-    let runs = experiment.runs.iter().map(|run| &bank.runs[*run]);
-    Compared {
-        name: runs.clone().map(|run| described(run.excitation, run.place)).collect::<Vec<_>>().join(", "),
-        duration: runs.map(power::Run::duration).sum(),
-        lambda: smallest(lambda),
-        told_apart: told_apart(lambda),
+/// A series with the middles between its values.
+fn halved(values: &[f64]) -> Vec<f64> {
+    let middles = values.windows(2).flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]);
+    middles.chain(values.last().copied()).collect()
+}
+
+/// An experiment with what it tells apart.
+struct Screened<'a> {
+    experiment: &'a Experiment,
+    /// s.
+    duration: f64,
+    lambda: DMatrix<f64>,
+}
+
+impl Screened<'_> {
+    fn row(&self, bank: &Bank) -> Compared {
+        let runs = self.experiment.runs.iter().map(|run| &bank.runs[*run]);
+        Compared {
+            name: runs.map(|run| described(run.excitation, run.place)).collect::<Vec<_>>().join(", "),
+            duration: self.duration,
+            lambda: smallest(&self.lambda),
+            told_apart: told_apart(&self.lambda),
+        }
     }
 }
 
@@ -408,12 +438,12 @@ fn told_apart(lambda: &DMatrix<f64>) -> usize {
     worst_pairs(lambda).filter(|(.., lambda)| *lambda >= ENOUGH).count()
 }
 
-/// The order of experiments: more pairs told apart, then the larger smallest λ of these.
-fn better(a: &DMatrix<f64>, b: &DMatrix<f64>) -> std::cmp::Ordering {
-    let key = |lambda: &DMatrix<f64>| {
+/// The order of experiments: more pairs told apart, then the larger smallest λ of these per second.
+fn order(a: &Screened, b: &Screened) -> std::cmp::Ordering {
+    let key = |Screened { lambda, duration, .. }: &Screened| {
         let told = worst_pairs(lambda).map(|(.., lambda)| lambda).filter(|lambda| *lambda >= ENOUGH);
         let least = told.fold(f64::INFINITY, f64::min);
-        (told_apart(lambda), if least.is_finite() { least } else { smallest(lambda) })
+        (told_apart(lambda), if least.is_finite() { least } else { smallest(lambda) } / duration)
     };
     let (a, b) = (key(a), key(b));
     b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))

@@ -24,12 +24,12 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Sampling of a planned command, s.
-pub const PERIOD: f64 = 0.01;
+/// Time between the corners of a planned command, s; it is played twice as finely.
+pub const PERIOD: f64 = 0.02;
 /// Time in s over which the noise of a sensor hangs together.
 const MEMORY: f64 = 0.1;
 /// Every how many samples readings are compared.
-const THINNED: usize = 4;
+const THINNED: usize = 2;
 /// Cut-off in rad/s of a valve that is shut.
 const SHUT: f64 = 1e-9;
 /// How much of the range of the pressure is used, tried one after the other until all models stay within the limits.
@@ -114,7 +114,8 @@ impl<'a> Bank<'a> {
             excitation.samples(PERIOD, limits.duration)
         };
         SHARES.iter().find_map(|scale| {
-            let pressures = shares.iter().map(|share| low + scale * share * (high - low));
+            // Around the middle: a load that drops fast can stretch the braid, as one that jumps can end the stroke.
+            let pressures = shares.iter().map(|share| low + (0.5 + scale * (share - 0.5)) * (high - low));
             let recording = inputs(pressures.collect(), place, &self.reference);
             let readings = self.rivals.iter().map(|rival| within(&rival.model, place, &recording, limits));
             let readings = readings.collect::<Option<Vec<_>>>()?;
@@ -166,8 +167,8 @@ impl<'a> Bank<'a> {
         start..start + own(&self.rivals[rival])
     }
 
-    /// λ of all ordered pairs of rivals, to first order: the row is the true one.
-    pub fn screened(&self, runs: &[usize], sensors: &[(Signal, f64)]) -> DMatrix<f64> {
+    /// Products of all vectors in an experiment, in units of what counts.
+    fn products(&self, runs: &[usize], sensors: &[(Signal, f64)]) -> DMatrix<f64> {
         let size = self.runs[runs[0]].products[0].nrows();
         let mut products = DMatrix::zeros(size, size);
         for run in runs {
@@ -175,6 +176,22 @@ impl<'a> Bank<'a> {
                 products += &self.runs[*run].products[position(*signal)] * weight(*noise).powi(2);
             }
         }
+        products
+    }
+
+    /// λ of every rival against the model around which they are looked at.
+    pub fn seen(&self, runs: &[usize], sensors: &[(Signal, f64)]) -> Vec<f64> {
+        let products = self.products(runs, sensors);
+        let first = self.rivals.len();
+        let corrections: Vec<usize> = (first..first + self.corrections.len()).collect();
+        let apart = |rival| DVector::from_fn(products.nrows(), |k, _| if k == rival { 1.0 } else { 0.0 });
+        (0..first).map(|rival| left(&products, &apart(rival), &[], &corrections)).collect()
+    }
+
+    /// λ of all ordered pairs of rivals, to first order: the row is the true one.
+    pub fn screened(&self, runs: &[usize], sensors: &[(Signal, f64)]) -> DMatrix<f64> {
+        let products = self.products(runs, sensors);
+        let size = products.nrows();
         let known = self.rivals[0].variants.is_empty();
         let lambda = |truth: usize, rival: usize| {
             if truth == rival {

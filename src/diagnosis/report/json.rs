@@ -57,6 +57,12 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         "held_out": diagnosis.held_out,
         "separating_experiment": separating_experiment(diagnosis),
         "corrections": parameters(&diagnosis.corrections),
+        "correction": diagnosis.correction.as_ref().map(|correction| json!({
+            "label": "cause unknown",
+            "acts_on": correction.acts_on,
+            "variables": correction.variables,
+            "improvement": correction.improvement,
+        })),
         "ranking": ranking,
         "notes": diagnosis.notes,
         "remaining": remaining,

@@ -11,7 +11,7 @@ pub use json::to_json;
 pub use pictures::{recording_plots, residual_plot};
 pub use simulated::simulated_csv;
 
-use super::{Diagnosis, Verdict};
+use super::{Correction, Diagnosis, Verdict};
 use crate::Result;
 use crate::effects::Effects;
 use crate::measurement::{Recording, Signal};
@@ -38,7 +38,9 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
         Verdict::PartlyExplained => format!("{named} Some structure is left that this does not explain."),
         Verdict::Ambiguous => format!("{named} This data cannot tell it from other causes, named below."),
         Verdict::Unexplained => {
-            "Something is wrong that no effect in the library accounts for: the cause is unknown.".to_owned()
+            let unknown = "Something is wrong that no effect in the library accounts for: the cause is unknown.";
+            let correction = diagnosis.correction.as_ref().map(Correction::sentence);
+            [unknown.to_owned()].into_iter().chain(correction).collect::<Vec<_>>().join(" ")
         }
     }
 }
@@ -105,6 +107,15 @@ pub fn files(
         let interface = muscle.interface();
         let name = format!("{}.fmu", interface.name);
         files.insert(0, made(&name, "the extended model for any FMI 2.0 tool", fmu(interface, extended, libraries)));
+    }
+    if let Some(correction) = &diagnosis.correction {
+        let purpose = "the nominal model with the correction without a cause, as parameters";
+        files.push(made("unknown_cause.toml", purpose, correction.parameters.to_toml().into()));
+        if let Some(muscle) = models().into_iter().next() {
+            let interface = muscle.interface();
+            let name = format!("{}-unknown-cause.fmu", interface.name);
+            files.push(made(&name, "the same for any FMI 2.0 tool", fmu(interface, &correction.parameters, libraries)));
+        }
     }
     let page = page::html(diagnosis, nominal, recordings, &files)?;
     files.push(made("report.html", "this page", page.into()));

@@ -258,12 +258,13 @@ mod tests {
     fn everything(verdict: Verdict, causes: Vec<Cause>) -> Diagnosis {
         let correction = FittedParameter { name: "muscle.area_scale", value: 1.01, low: 1.0, high: 1.02, unit: "1" };
         Diagnosis {
+            correction: None,
             verdict,
             causes,
             signals: vec![SignalErrors { signal: Signal::Force, nominal_rms: 20.0, extended_rms: 2.0, noise_rms: 1.0 }],
             improvement: 0.9,
             held_out: "<i>.csv from 6.0 s".to_owned(),
-            ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2 }],
+            ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2, parameters: Vec::new() }],
             extended: Parameters::default(),
             corrections: vec![correction],
             notes: vec!["<b>bold</b>".to_owned()],
@@ -283,6 +284,7 @@ mod tests {
     #[test]
     fn page_tells_alternatives_what_is_left_and_what_to_measure() {
         let cause = Cause {
+            rivals: Vec::new(),
             effect: "payload_mass",
             sentence: "The load is 2 kg heavier.".to_owned(),
             parameters: Vec::new(),
