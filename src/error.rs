@@ -130,6 +130,20 @@ pub enum Error {
         /// What is missing and what to do.
         problem: String,
     },
+    /// A diagnosis from which no experiment can be planned.
+    #[error("{}: {problem}", path.display())]
+    Diagnosis {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit and what to do.
+        problem: String,
+    },
+    /// An experiment that cannot be planned.
+    #[error("{problem}")]
+    Plan {
+        /// Why not and what to do.
+        problem: String,
+    },
     /// A file that cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {

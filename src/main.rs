@@ -3,9 +3,10 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
+use sinew::diagnosis::plan::{self, Limits, Plan, Task};
 use sinew::diagnosis::{self, Diagnosis, diagnose, report};
 use sinew::effects::Effects;
-use sinew::measurement::{self, Recording};
+use sinew::measurement::{self, Recording, Signal};
 use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
@@ -65,6 +66,13 @@ enum Command {
         #[arg(long, default_value = "sinew-diagnosis")]
         out: PathBuf,
     },
+    /// Propose the recording that tells apart the causes that are left
+    #[command(after_help = "Examples:\n  sinew plan sinew-diagnosis/diagnosis.json --load-mass 20,40 --out plan\n  \
+        sinew plan --effects payload_mass,force_gain --load-mass 20 --sensors contraction\n  \
+        sinew plan --effects all\n\n\
+        plan.csv holds the command to play; diagnose what you record with it together with the recordings there are.\n\
+        Without a diagnosis, the recording is planned that tells all effects apart as well as one can.")]
+    Plan(PlanArguments),
     /// Do it all once, on recordings that ship with the program
     #[command(after_help = "Example:\n  sinew demo --out sinew-demo")]
     Demo {
@@ -78,6 +86,83 @@ enum Command {
         /// What to list
         what: Listing,
     },
+}
+
+#[derive(Args)]
+struct PlanArguments {
+    /// Diagnosis that left something open [default: sinew-diagnosis/diagnosis.json where it is there]
+    #[arg(value_name = "diagnosis.json", conflicts_with = "effects")]
+    diagnosis: Option<PathBuf>,
+    #[command(flatten)]
+    parameters: ParameterSource,
+    /// Effects to tell apart instead, at a usual size; or `all`
+    #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
+    effects: Vec<String>,
+    /// Sensors of the rig, where no diagnosis tells them
+    #[arg(long, value_delimiter = ',', default_value = "gauge_pressure,contraction", value_parser = sensor)]
+    sensors: Vec<Signal>,
+    /// Highest gauge pressure, as in "5 bar"; without a unit in Pa
+    #[arg(long, default_value = "5 bar", value_parser = |text: &str| quantity(text, Signal::GaugePressure))]
+    most_pressure: f64,
+    /// Largest contraction, as in "200 mm"; without a unit in m [default: a quarter of the rest length]
+    #[arg(long, value_parser = |text: &str| quantity(text, Signal::Contraction))]
+    most_contraction: Option<f64>,
+    /// Loads that can be hung on, kg
+    #[arg(long, value_delimiter = ',', default_value = "20,40", value_parser = |text: &str| quantity(text, Signal::LoadMass))]
+    load_mass: Vec<f64>,
+    /// Longest single recording, s
+    #[arg(long, default_value_t = plan::USUAL_DURATION, value_parser = |text: &str| quantity(text, Signal::Time))]
+    duration: f64,
+    /// Relative error of the nominal coefficients that is no cause
+    #[arg(long, default_value_t = diagnosis::DEFAULT_TOLERANCE, value_parser = tolerance)]
+    tolerance: f64,
+    /// Folder for plan.csv, plan.json and the plots
+    #[arg(long, default_value = "sinew-plan")]
+    out: PathBuf,
+}
+
+impl PlanArguments {
+    /// What is to be told apart.
+    fn task(&self, nominal: &Parameters) -> Result<Task> {
+        let usual = Path::new("sinew-diagnosis/diagnosis.json");
+        let there = || (self.effects.is_empty() && usual.is_file()).then_some(usual);
+        if let Some(path) = self.diagnosis.as_deref().or_else(there) {
+            if let Some(task) = Task::of_diagnosis(path, nominal)? {
+                return Ok(task);
+            }
+        }
+        let names: &[String] = if self.effects == ["all"] { &[] } else { &self.effects };
+        Task::of_effects(names, &self.sensors, nominal)
+    }
+
+    fn limits(&self) -> Limits {
+        Limits {
+            most_pressure: self.most_pressure,
+            most_contraction: self.most_contraction,
+            load_masses: self.load_mass.clone(),
+            duration: self.duration,
+        }
+    }
+}
+
+fn sensor(text: &str) -> std::result::Result<Signal, String> {
+    let found = OUTPUTS.into_iter().find(|signal| signal.name() == text);
+    found.ok_or_else(|| "one of gauge_pressure, contraction, force".to_owned())
+}
+
+/// A positive number in SI, with or without a unit behind it.
+fn quantity(text: &str, signal: Signal) -> std::result::Result<f64, String> {
+    let number = text.trim_end_matches(|c: char| c.is_alphabetic() && c != 'e').trim_end();
+    let unit = text[number.len()..].trim();
+    let scale = signal.units().iter().find(|(symbol, _)| *symbol == unit).map(|(_, scale)| *scale);
+    let scale = if unit.is_empty() { Some(1.0) } else { scale };
+    match (number.parse::<f64>(), scale) {
+        (Ok(value), Some(scale)) if value.is_finite() && value > 0.0 => Ok(value * scale),
+        _ => {
+            let symbols = signal.units().iter().map(|(symbol, _)| *symbol).collect::<Vec<_>>().join(", ");
+            Err(format!("a positive number, in {symbols}"))
+        }
+    }
 }
 
 #[derive(Args)]
@@ -163,6 +248,7 @@ fn run(command: Command) -> Result<Answer> {
         Command::Diagnose { recordings, parameters, tolerance, out } => {
             run_diagnosis(&parameters.load()?, &recordings.read()?, tolerance, &out)
         }
+        Command::Plan(arguments) => run_plan(&arguments),
         Command::Demo { out } => run_demo(&out),
         Command::List { what } => Ok(list(what)),
     }
@@ -231,6 +317,35 @@ fn told(found: &Diagnosis) -> String {
             signal.signal.unit()
         );
     }
+    text
+}
+
+fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
+    let (nominal, limits) = (arguments.parameters.load()?, arguments.limits());
+    let task = arguments.task(&nominal)?;
+    let bar = progress(plan::pieces(&limits));
+    let found = plan::plan(&task, &nominal, arguments.tolerance, &limits, &|name| {
+        bar.set_message(name.to_owned());
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let files = export::write_whole(plan::files(&found, &nominal, &arguments.out))?;
+    let mut json = plan::to_json(&found);
+    json["files"] = json!(files);
+    Ok(Answer { text: format!("{}\n{}", planned(&found), listed(&files)), json })
+}
+
+/// A plan in a table or two.
+fn planned(found: &Plan) -> String {
+    let mut text = format!("To tell apart: {}.\n{}\n\n", found.why, found.sentence());
+    let header = ["experiment", "seconds", "pairs told apart", "smallest lambda"].map(str::to_owned);
+    let row = |row: &plan::Compared| {
+        [row.name.clone(), format!("{:.0}", row.duration), row.told_apart.to_string(), format!("{:.3e}", row.lambda)]
+    };
+    let rows = std::iter::once(header).chain(found.compared.iter().map(row));
+    text += &table(rows.map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect()).text;
+    let all = plan::matrix(found);
+    text += &format!("\nlambda of the best (from {:.0} on a pair is told apart):\n{all}", plan::ENOUGH);
     text
 }
 

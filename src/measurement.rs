@@ -131,6 +131,12 @@ impl Recording {
         Self { path: path.to_owned(), name, time, signals, units, notes }.checked()
     }
 
+    /// An experiment that is yet to be made: its inputs in SI units, each of shape `(n_samples,)`.
+    pub(crate) fn planned(name: &str, time: Vec<f64>, inputs: BTreeMap<Signal, Vec<f64>>) -> Self {
+        let (path, name) = (PathBuf::from(name), name.to_owned());
+        Self { path, name, time, signals: inputs, units: BTreeMap::new(), notes: Vec::new() }
+    }
+
     /// Refuses what no use could be made of, and drops rows without a new time.
     fn checked(mut self) -> Result<Self> {
         let fresh: Vec<bool> = (0..self.time.len()).map(|k| k == 0 || self.time[k] > self.time[k - 1]).collect();

@@ -7,18 +7,24 @@
 //! nothing is wrong, or that the cause is unknown.
 
 mod candidates;
+mod links;
 mod noise;
+mod remaining;
+pub mod plan;
 pub mod report;
 mod residuals;
 mod selection;
 
 pub use candidates::FittedParameter;
+pub use remaining::Remaining;
 
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
+use crate::quality;
 use crate::simulation::replay;
+use crate::variables::Declared;
 use crate::{Error, Result};
-use candidates::Bench;
+use candidates::{Bench, Fitted};
 use residuals::Data;
 use residuals::Scope;
 use selection::{Chosen, Judged, Search};
@@ -55,9 +61,14 @@ pub struct Cause {
     pub parameters: Vec<FittedParameter>,
     /// Effects that this data cannot tell from it.
     pub alternatives: Vec<&'static str>,
-    /// The experiment that would.
+    /// Their fits: what each model with one of them in place of the named one changes of the nominal model.
+    pub rivals: Vec<(&'static str, Values)>,
+    /// The experiment that would tell them apart.
     pub experiment: &'static str,
 }
+
+/// Parameters with their values, SI.
+pub type Values = Vec<(&'static str, f64)>;
 
 /// Errors of one signal on samples that no fit saw, in its SI unit.
 #[derive(Debug, Clone, Copy)]
@@ -81,6 +92,8 @@ pub struct Ranked {
     pub explained: f64,
     /// Evidence for the effect (natural logarithm, at the effective number of samples).
     pub evidence: f64,
+    /// What its fit changes of the nominal model.
+    pub parameters: Values,
 }
 
 /// The answer.
@@ -102,6 +115,10 @@ pub struct Diagnosis {
     pub extended: Parameters,
     /// Corrections of the nominal model that were fitted along.
     pub corrections: Vec<FittedParameter>,
+    /// What a person should know about the input.
+    pub notes: Vec<String>,
+    /// What the error that is left goes with.
+    pub remaining: Vec<Remaining>,
 }
 
 /// Diagnoses recordings against a nominal model.
@@ -117,6 +134,7 @@ pub fn diagnose(
     tolerance: f64,
     done: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis> {
+    let notes = quality::notes(recordings, nominal)?;
     for recording in recordings {
         replay(nominal, recording)?; // a model that cannot be simulated at all is the user's to mend
     }
@@ -124,30 +142,31 @@ pub fn diagnose(
         path: recordings[0].path.clone(),
         problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
     };
-    let mut bench = Bench::new(Data::new(recordings, nominal)?, nominal, tolerance);
+    let mut bench = Bench::new(Data::new(recordings, nominal, tolerance)?, nominal, tolerance);
     let first = bench.baseline().ok_or_else(cannot_follow)?;
     bench.refine_noise(&first.residuals);
     let baseline = bench.baseline().ok_or_else(cannot_follow)?;
     done("nominal");
-    let chosen = Search::new(&mut bench, baseline, tolerance).run(done).ok_or_else(cannot_follow)?;
-    Ok(answer(&bench, nominal, chosen).ok_or_else(cannot_follow)?)
+    let chosen = Search::new(&mut bench, baseline).run(done).ok_or_else(cannot_follow)?;
+    answer(&bench, nominal, &chosen, notes).ok_or_else(cannot_follow)
 }
 
 /// The choice in words and figures.
-fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnosis> {
+fn answer(bench: &Bench, nominal: &Parameters, chosen: &Chosen, notes: Vec<String>) -> Option<Diagnosis> {
     let data = &bench.data;
     let nominal_residuals = data.residuals(nominal)?;
     let (parameters, corrections) = bench.intervals(&chosen.model, Scope::Training);
     let nominal_errors = data.held_out_rms(&nominal_residuals);
     let mut extended = chosen.model.parameters;
-    let mut extended_errors = data.held_out_rms(&chosen.model.residuals);
+    let mut left = chosen.model.residuals.clone();
+    let mut extended_errors = data.held_out_rms(&left);
     let weighted = |errors: &BTreeMap<Signal, f64>| {
         let squares = errors.iter().map(|(signal, rms)| (rms / data.noise(*signal).level).powi(2));
         squares.sum::<f64>().sqrt()
     };
     // Corrections that do not help on unseen samples are not made.
     if chosen.model.hypothesis.parts.is_empty() && weighted(&extended_errors) > weighted(&nominal_errors) {
-        (extended, extended_errors) = (*nominal, nominal_errors.clone());
+        (extended, extended_errors, left) = (*nominal, nominal_errors.clone(), nominal_residuals);
     }
     let (before, after) = (weighted(&nominal_errors), weighted(&extended_errors));
     let signals = nominal_errors.iter().map(|(signal, nominal_rms)| SignalErrors {
@@ -160,21 +179,24 @@ fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnos
         effect: judged.fitted.hypothesis.parts[0].effect.name,
         explained: judged.explained,
         evidence: judged.evidence,
+        parameters: changes(nominal, &judged.fitted.parameters),
     };
     Some(Diagnosis {
         verdict: chosen.verdict,
-        causes: causes(&chosen, &parameters),
+        causes: causes(chosen, nominal, &parameters),
         signals: signals.collect(),
         improvement: if before > 0.0 { 1.0 - after / before } else { 0.0 },
         held_out: data.held_out(),
         ranking: chosen.singles.iter().map(baseline).collect(),
         extended,
         corrections,
+        notes,
+        remaining: remaining::remaining(data, &extended, &left),
     })
 }
 
 /// The causes as they are told, the largest first.
-fn causes(chosen: &Chosen, parameters: &[FittedParameter]) -> Vec<Cause> {
+fn causes(chosen: &Chosen, nominal: &Parameters, parameters: &[FittedParameter]) -> Vec<Cause> {
     let parts = chosen.model.hypothesis.parts.iter().zip(&chosen.alternatives);
     let causes = parts.map(|(part, alternatives)| {
         let effect = part.effect;
@@ -184,8 +206,38 @@ fn causes(chosen: &Chosen, parameters: &[FittedParameter]) -> Vec<Cause> {
             sentence: chosen.model.parameters.effects.sentence(effect.name).unwrap_or_default(),
             parameters: parameters.iter().filter(own).cloned().collect(),
             alternatives: alternatives.clone(),
+            rivals: rivals(chosen, nominal, effect.name, alternatives),
             experiment: effect.experiment,
         }
     });
     causes.collect()
+}
+
+/// The fits with each of the alternatives in the place of a named effect.
+fn rivals(
+    chosen: &Chosen,
+    nominal: &Parameters,
+    effect: &str,
+    alternatives: &[&'static str],
+) -> Vec<(&'static str, Values)> {
+    let others: Vec<_> = chosen.model.hypothesis.names().into_iter().filter(|name| *name != effect).collect();
+    let fit_with = |name: &'static str| {
+        let stands_in = |rival: &&Fitted| rival.hypothesis.has(name) && others.iter().all(|o| rival.hypothesis.has(o));
+        let rival = chosen.rivals.iter().find(stands_in)?;
+        Some((name, changes(nominal, &rival.parameters)))
+    };
+    alternatives.iter().filter_map(|name| fit_with(name)).collect()
+}
+
+/// The parameters of a model that differ from the nominal ones.
+fn changes(nominal: &Parameters, model: &Parameters) -> Values {
+    let (mut before, mut changes) = (Vec::new(), Vec::new());
+    nominal.visit(&mut |_, value| before.push(value));
+    let mut before = before.into_iter();
+    model.visit(&mut |variable, value| {
+        if before.next() != Some(value) {
+            changes.push((variable.name, value));
+        }
+    });
+    changes
 }

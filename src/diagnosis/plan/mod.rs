@@ -1,0 +1,420 @@
+//! The next experiment: the recording that best tells apart what a diagnosis left standing.
+//!
+//! # Method
+//! A library of courses of the command, with the loads there are, with a further load and at locked length, is simulated
+//! under every remaining model, within the limits of the rig. Of each experiment λ says how far the rivals stay apart
+//! (see `power.rs`); the experiment whose worst pair is told apart best is proposed. Where none reaches
+//! [`ENOUGH`], what the rig lacks is named: a second load, a sensor, a clamp, a valve that shuts.
+
+mod excitations;
+mod files;
+mod power;
+mod rivals;
+
+pub use excitations::EXCITATIONS;
+pub use files::{files, matrix, to_json};
+pub use rivals::{Rival, Task};
+
+use super::candidates::corrections;
+use crate::measurement::Signal;
+use crate::parameters::Parameters;
+use crate::{Error, Result};
+use nalgebra::DMatrix;
+use power::{Bank, Corrections};
+
+/// λ from which two models are told apart beyond doubt: five standard deviations.
+pub const ENOUGH: f64 = 25.0;
+/// Experiments of each kind whose rivals are fitted, the most promising ones.
+const FITTED: usize = 2;
+/// Damping and cut-off of the valve are known this much worse than areas: no experiment should hang on them.
+const DYNAMIC_SLACK: f64 = 3.0;
+/// Most experiments that are reported.
+const REPORTED: usize = 8;
+/// Longest experiment by default, s.
+pub const USUAL_DURATION: f64 = 60.0;
+/// Highest gauge pressure by default, Pa.
+pub const USUAL_PRESSURE: f64 = 5e5;
+/// Largest contraction of a FESTO muscle, as a share of its rest length.
+const LARGEST_STROKE: f64 = 0.25;
+
+/// What the rig can do.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// Highest gauge pressure in Pa.
+    pub most_pressure: f64,
+    /// Largest contraction in m; `None` for a quarter of the rest length.
+    pub most_contraction: Option<f64>,
+    /// Loads that can be hung on, kg; at least one.
+    pub load_masses: Vec<f64>,
+    /// Longest single recording, s.
+    pub duration: f64,
+}
+
+impl Limits {
+    /// Largest contraction of a muscle in m.
+    fn most_contraction(&self, model: &Parameters) -> f64 {
+        self.most_contraction.unwrap_or(LARGEST_STROKE * model.muscle.rest_length)
+    }
+
+    /// A load in kg beyond the only one there is.
+    fn further_load(&self) -> Option<f64> {
+        (self.load_masses.len() == 1).then(|| 1.5 * self.load_masses[0])
+    }
+}
+
+/// Where the muscle works in a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// Under a hanging load in kg.
+    Load(f64),
+    /// Held at a contraction, as a share of the rest length.
+    Locked(f64),
+    /// Under a hanging load in kg, the valve shut.
+    ValveShut(f64),
+}
+
+impl Place {
+    /// Hanging load in kg.
+    pub fn load_mass(self) -> Option<f64> {
+        match self {
+            Place::Load(mass) | Place::ValveShut(mass) => Some(mass),
+            Place::Locked(_) => None,
+        }
+    }
+
+    fn valve_shut(self) -> bool {
+        matches!(self, Place::ValveShut(_))
+    }
+}
+
+/// What the rig may lack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Need {
+    /// Another load, kg.
+    Load(f64),
+    /// A sensor.
+    Sensor(Signal),
+    /// Something that holds the ends of the muscle.
+    Clamp,
+    /// A valve that can be shut.
+    ShutOffValve,
+}
+
+impl Need {
+    /// In words.
+    pub fn words(self) -> String {
+        match self {
+            Need::Load(mass) => format!("a second load of about {mass:.0} kg"),
+            Need::Sensor(Signal::GaugePressure) => "a pressure sensor at the muscle (`gauge_pressure`)".to_owned(),
+            Need::Sensor(Signal::Force) => "a force sensor (`force`)".to_owned(),
+            Need::Sensor(signal) => format!("a sensor of `{}`", signal.name()),
+            Need::Clamp => "a clamp that holds the muscle at a fixed length".to_owned(),
+            Need::ShutOffValve => "a shut-off valve at the muscle".to_owned(),
+        }
+    }
+}
+
+/// An experiment: one run or several that belong together.
+#[derive(Debug, Clone)]
+struct Experiment {
+    runs: Vec<usize>,
+    needs: Vec<Need>,
+}
+
+/// One line of the comparison.
+#[derive(Debug, Clone)]
+pub struct Compared {
+    /// The experiment in words.
+    pub name: String,
+    /// How long it takes, s.
+    pub duration: f64,
+    /// λ of the pair that it tells apart worst.
+    pub lambda: f64,
+    /// Pairs whose λ is enough.
+    pub told_apart: usize,
+}
+
+/// One recording that is to be made.
+#[derive(Debug, Clone)]
+pub struct Planned {
+    /// Name of the CSV file.
+    pub file: String,
+    /// Name of the course.
+    pub excitation: &'static str,
+    /// Where the muscle works.
+    pub place: Place,
+    /// Time in s, shape `(n_samples,)`.
+    pub time: Vec<f64>,
+    /// Command in V, shape `(n_samples,)`.
+    pub command: Vec<f64>,
+    /// Contraction in m at which the muscle is held.
+    pub locked: Option<f64>,
+}
+
+/// How far two models are apart.
+#[derive(Debug, Clone, Copy)]
+pub struct Pair {
+    /// The two effects.
+    pub effects: [&'static str; 2],
+    /// λ, the smaller one of both directions.
+    pub lambda: f64,
+}
+
+/// The proposal.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// What is to be told apart, in words.
+    pub why: String,
+    /// The models.
+    pub rivals: Vec<Rival>,
+    /// Sensors that the proposal counts on.
+    pub sensors: Vec<Signal>,
+    /// What it takes beyond the rig as it is.
+    pub needs: Vec<Need>,
+    /// The recordings to make.
+    pub runs: Vec<Planned>,
+    /// The experiments of the same means, the best first.
+    pub compared: Vec<Compared>,
+    /// How far apart each pair is then, the closest first.
+    pub pairs: Vec<Pair>,
+}
+
+impl Plan {
+    /// Pairs that the proposal cannot tell apart.
+    pub fn confused(&self) -> impl Iterator<Item = &Pair> {
+        self.pairs.iter().filter(|pair| pair.lambda < ENOUGH)
+    }
+
+    /// How long the recordings take together, s.
+    pub fn duration(&self) -> f64 {
+        self.runs.iter().filter_map(|run| run.time.last()).sum()
+    }
+
+    /// The proposal in a sentence or three.
+    pub fn sentence(&self) -> String {
+        let runs: Vec<String> = self.runs.iter().map(|run| described(run.excitation, run.place)).collect();
+        let mut text = format!("Record {} ({:.0} s).", runs.join(", and "), self.duration());
+        if !self.needs.is_empty() {
+            let needs: Vec<String> = self.needs.iter().map(|need| need.words()).collect();
+            text += &format!(" This takes {}: without, no experiment of the library is enough.", needs.join(" and "));
+        }
+        let confused: Vec<String> = self.confused().map(|pair| pair.effects.join(" from ")).collect();
+        if !confused.is_empty() && self.rivals.len() <= FEW_RIVALS {
+            text += &format!(
+                " No experiment of the library tells {}, not even with more loads or sensors: it takes another sensor or \
+                 a reference, such as a calibrated gauge.",
+                confused.join(", or ")
+            );
+        }
+        text
+    }
+}
+
+/// More rivals than this are surveyed: nothing is fitted, and nothing is asked for that the rig has not.
+const FEW_RIVALS: usize = 6;
+
+fn described(excitation: &str, place: Place) -> String {
+    match place {
+        Place::Load(mass) | Place::ValveShut(mass) => format!("{excitation} under {mass:.0} kg"),
+        Place::Locked(share) => format!("{excitation} locked at {:.0} % contraction", 100.0 * share),
+    }
+}
+
+/// How many times [`plan`] tells that something is done, at most.
+pub fn pieces(limits: &Limits) -> usize {
+    EXCITATIONS.len() * (limits.load_masses.len() + 3)
+}
+
+/// Proposes the experiment that tells the models of a task apart; `done` is told after each simulated run.
+///
+/// `tolerance` is the relative error that the nominal coefficients may have.
+///
+/// # Errors
+/// [`Error::Plan`] where the limits leave no experiment.
+pub fn plan(
+    task: &Task,
+    nominal: &Parameters,
+    tolerance: f64,
+    limits: &Limits,
+    done: &(dyn Fn(&str) + Sync),
+) -> Result<Plan> {
+    let bank = Bank::new(&task.rivals, nominal, slack(corrections(nominal, tolerance)), limits, done);
+    let experiments = experiments(&bank, limits);
+    let mut best: Option<Choice> = None;
+    for needs in levels(task, limits) {
+        let Some(choice) = Choice::of(&bank, task, &experiments, needs) else { continue };
+        if best.as_ref().is_none_or(|best| choice.rows[0].told_apart > best.rows[0].told_apart) {
+            best = Some(choice);
+        }
+        let pairs = task.rivals.len() * (task.rivals.len() - 1) / 2;
+        if best.as_ref().is_some_and(|best| best.rows[0].told_apart == pairs) {
+            break;
+        }
+    }
+    let nothing = || Error::Plan {
+        problem: "the limits leave no experiment: allow more pressure, more contraction or another load".to_owned(),
+    };
+    Ok(best.ok_or_else(nothing)?.plan(&bank, task))
+}
+
+/// The corrections, those of coefficients of motion wider.
+fn slack(mut corrections: Corrections) -> Corrections {
+    for (variable, free) in &mut corrections {
+        if ["muscle.damping", "valve.bandwidth"].contains(&variable.name) {
+            let start = free.start;
+            (free.lower, free.upper) =
+                (start + DYNAMIC_SLACK * (free.lower - start), start + DYNAMIC_SLACK * (free.upper - start));
+            free.prior = free.prior.map(|(mean, deviation)| (mean, DYNAMIC_SLACK * deviation));
+        }
+    }
+    corrections
+}
+
+/// All single runs, and the same course under all loads or at all lengths.
+fn experiments(bank: &Bank, limits: &Limits) -> Vec<Experiment> {
+    let needs = |run: usize| match bank.runs[run].place {
+        Place::Locked(_) => vec![Need::Clamp],
+        Place::ValveShut(_) => vec![Need::ShutOffValve],
+        Place::Load(mass) if !limits.load_masses.contains(&mass) => vec![Need::Load(mass)],
+        Place::Load(_) => vec![],
+    };
+    let mut all: Vec<Experiment> =
+        (0..bank.runs.len()).map(|run| Experiment { runs: vec![run], needs: needs(run) }).collect();
+    for first in 0..bank.runs.len() {
+        let a = &bank.runs[first];
+        let partners = (first + 1..bank.runs.len()).filter(|second| {
+            let b = &bank.runs[*second];
+            let alike = std::mem::discriminant(&a.place) == std::mem::discriminant(&b.place);
+            alike && a.excitation == b.excitation
+        });
+        for second in partners {
+            let mut together = needs(first);
+            together.extend(needs(second).into_iter().filter(|need| !needs(first).contains(need)));
+            all.push(Experiment { runs: vec![first, second], needs: together });
+        }
+    }
+    all
+}
+
+/// What may be asked for: nothing, then one thing, then two, what is least trouble first.
+fn levels(task: &Task, limits: &Limits) -> Vec<Vec<Need>> {
+    if task.rivals.len() > FEW_RIVALS {
+        return vec![vec![]];
+    }
+    let missing = |signal: Signal| task.sensors.iter().all(|(there, _)| *there != signal);
+    let sensors = [Signal::GaugePressure, Signal::Contraction].into_iter().filter(|signal| missing(*signal));
+    let mut all: Vec<Need> = limits.further_load().map(Need::Load).into_iter().collect();
+    all.extend(sensors.map(Need::Sensor));
+    all.push(Need::Clamp);
+    all.extend(missing(Signal::Force).then_some(Need::Sensor(Signal::Force)));
+    all.push(Need::ShutOffValve);
+    let mut levels = vec![vec![]];
+    levels.extend(all.iter().map(|need| vec![*need]));
+    for (k, first) in all.iter().enumerate() {
+        levels.extend(all[k + 1..].iter().map(|second| vec![*first, *second]));
+    }
+    levels
+}
+
+/// The best experiments of some means.
+struct Choice {
+    needs: Vec<Need>,
+    sensors: Vec<(Signal, f64)>,
+    experiment: Experiment,
+    /// λ of the best experiment.
+    lambda: DMatrix<f64>,
+    rows: Vec<Compared>,
+}
+
+impl Choice {
+    fn of(bank: &Bank, task: &Task, experiments: &[Experiment], needs: Vec<Need>) -> Option<Self> {
+        let mut sensors = task.sensors.clone();
+        sensors.extend(needs.iter().filter_map(|need| match need {
+            Need::Sensor(signal) => Some((*signal, rivals::usual_noise(*signal))),
+            _ => None,
+        }));
+        let possible = experiments.iter().filter(|e| e.needs.iter().all(|need| needs.contains(need)));
+        let mut screened: Vec<(&Experiment, DMatrix<f64>)> =
+            possible.map(|experiment| (experiment, bank.screened(&experiment.runs, &sensors))).collect();
+        screened.sort_by(|a, b| better(&a.1, &b.1));
+        screened.truncate(REPORTED);
+        // Only what promises something is worth the fits.
+        let promising = screened.first().is_some_and(|(_, lambda)| told_apart(lambda) > 0);
+        if promising && task.rivals.len() <= FEW_RIVALS {
+            for (experiment, lambda) in screened.iter_mut().take(FITTED) {
+                *lambda = bank.fitted(&experiment.runs, &sensors);
+            }
+            screened.truncate(FITTED.max(1));
+            screened.sort_by(|a, b| better(&a.1, &b.1));
+        }
+        let rows = screened.iter().map(|(experiment, lambda)| compared(bank, experiment, lambda)).collect();
+        let (experiment, lambda) = screened.into_iter().next()?;
+        Some(Self { needs, sensors, experiment: experiment.clone(), lambda, rows })
+    }
+
+    fn plan(self, bank: &Bank, task: &Task) -> Plan {
+        let several = self.experiment.runs.len() > 1;
+        let runs = self.experiment.runs.iter().enumerate().map(|(k, run)| {
+            let run = &bank.runs[*run];
+            let input = |signal: Signal| run.recording.get(signal).map(<[f64]>::to_vec);
+            Planned {
+                file: if several { format!("plan-{}.csv", k + 1) } else { "plan.csv".to_owned() },
+                excitation: run.excitation,
+                place: run.place,
+                time: run.recording.time.clone(),
+                command: input(Signal::Command).unwrap_or_default(),
+                locked: input(Signal::Contraction).map(|contraction| contraction[0]),
+            }
+        });
+        let mut pairs: Vec<Pair> = worst_pairs(&self.lambda)
+            .map(|(a, b, lambda)| Pair { effects: [task.rivals[a].name, task.rivals[b].name], lambda })
+            .collect();
+        pairs.sort_by(|a, b| a.lambda.total_cmp(&b.lambda));
+        Plan {
+            why: task.why.clone(),
+            rivals: task.rivals.clone(),
+            sensors: self.sensors.iter().map(|(signal, _)| *signal).collect(),
+            needs: self.needs,
+            runs: runs.collect(),
+            compared: self.rows,
+            pairs,
+        }
+    }
+}
+
+fn compared(bank: &Bank, experiment: &Experiment, lambda: &DMatrix<f64>) -> Compared {
+    let runs = experiment.runs.iter().map(|run| &bank.runs[*run]);
+    Compared {
+        name: runs.clone().map(|run| described(run.excitation, run.place)).collect::<Vec<_>>().join(", "),
+        duration: runs.map(power::Run::duration).sum(),
+        lambda: smallest(lambda),
+        told_apart: told_apart(lambda),
+    }
+}
+
+/// Pairs with the smaller λ of both directions.
+fn worst_pairs(lambda: &DMatrix<f64>) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+    let count = lambda.nrows();
+    (0..count)
+        .flat_map(move |a| (a + 1..count).map(move |b| (a, b)))
+        .map(|(a, b)| (a, b, lambda[(a, b)].min(lambda[(b, a)])))
+}
+
+fn smallest(lambda: &DMatrix<f64>) -> f64 {
+    worst_pairs(lambda).map(|(.., lambda)| lambda).fold(f64::INFINITY, f64::min)
+}
+
+fn told_apart(lambda: &DMatrix<f64>) -> usize {
+    worst_pairs(lambda).filter(|(.., lambda)| *lambda >= ENOUGH).count()
+}
+
+/// The order of experiments: more pairs told apart, then the larger smallest λ of these.
+fn better(a: &DMatrix<f64>, b: &DMatrix<f64>) -> std::cmp::Ordering {
+    let key = |lambda: &DMatrix<f64>| {
+        let told = worst_pairs(lambda).map(|(.., lambda)| lambda).filter(|lambda| *lambda >= ENOUGH);
+        let least = told.fold(f64::INFINITY, f64::min);
+        (told_apart(lambda), if least.is_finite() { least } else { smallest(lambda) })
+    };
+    let (a, b) = (key(a), key(b));
+    b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+}

@@ -1,0 +1,81 @@
+//! What `sinew plan` proposes for effects that some recordings cannot tell apart.
+
+use sinew::diagnosis::DEFAULT_TOLERANCE;
+use sinew::diagnosis::plan::{self, ENOUGH, Limits, Need, Plan, Task, files};
+use sinew::measurement::{Recording, Signal};
+use sinew::parameters::Parameters;
+use sinew::simulation::replay;
+use std::path::Path;
+
+fn limits(load_masses: &[f64]) -> Limits {
+    Limits { most_pressure: 4e5, most_contraction: Some(0.2), load_masses: load_masses.to_vec(), duration: 40.0 }
+}
+
+fn planned(effects: &[&str], sensors: &[Signal], limits: &Limits) -> Plan {
+    let names: Vec<String> = effects.iter().map(|name| (*name).to_owned()).collect();
+    let task = Task::of_effects(&names, sensors, &Parameters::default()).unwrap();
+    let found = plan::plan(&task, &Parameters::default(), DEFAULT_TOLERANCE, limits, &|_| ()).unwrap();
+    println!("{}\n{:#?}", found.sentence(), found.compared);
+    found
+}
+
+#[test]
+fn a_wrong_load_and_a_wrong_force_take_a_second_load() {
+    let pair = ["payload_mass", "force_gain"];
+    let sensors = [Signal::GaugePressure, Signal::Contraction];
+    let one = planned(&pair, &sensors, &limits(&[20.0]));
+    assert!(one.needs.iter().any(|need| matches!(need, Need::Load(_))), "{:?}", one.needs);
+    let two = planned(&pair, &sensors, &limits(&[20.0, 40.0]));
+    assert!(two.needs.is_empty() && two.confused().next().is_none());
+    let masses: Vec<_> = two.runs.iter().filter_map(|run| run.place.load_mass()).collect();
+    assert_eq!(masses, [20.0, 40.0]);
+}
+
+#[test]
+fn a_late_valve_and_a_late_sensor_take_a_pressure_sensor() {
+    let found =
+        planned(&["valve_dead_time", "contraction_sensor_delay"], &[Signal::Contraction], &limits(&[20.0, 40.0]));
+    assert_eq!(found.needs, [Need::Sensor(Signal::GaugePressure)]);
+    assert!(found.pairs[0].lambda > ENOUGH);
+}
+
+#[test]
+fn two_gains_of_the_pressure_take_another_sensor_or_a_reference() {
+    let found = planned(&["valve_gain", "pressure_sensor_gain"], &[Signal::GaugePressure], &limits(&[20.0, 40.0]));
+    let asks = found.needs.iter().any(|need| matches!(need, Need::Sensor(_)));
+    assert!(asks || found.sentence().contains("a reference"), "{}", found.sentence());
+}
+
+#[test]
+fn a_plan_respects_the_limits_and_reads_back() {
+    let limits = limits(&[20.0, 40.0]);
+    let found = planned(&["friction_hysteresis", "viscous_damping"], &[Signal::Contraction], &limits);
+    assert!(found.confused().next().is_none());
+    let written = files(&found, &Parameters::default(), Path::new("out"));
+    for run in &found.runs {
+        let (_, bytes) = written.iter().find(|(path, _)| path.ends_with(&run.file)).unwrap();
+        // As the rig completes it: with what the sensor showed.
+        let text = String::from_utf8(bytes.clone()).unwrap();
+        let filled: Vec<String> = text
+            .lines()
+            .enumerate()
+            .map(|(k, line)| format!("{line},{}", if k == 0 { "force [N]" } else { "1" }))
+            .collect();
+        let recording = Recording::parse(filled.join("\n").as_bytes(), Path::new("plan.csv"), &[]).unwrap();
+        assert!(recording.notes.is_empty() && recording.time.windows(2).all(|t| (t[1] - t[0] - 0.01).abs() < 1e-9));
+        for rival in &found.rivals {
+            let shown = replay(&rival.model, &recording).unwrap();
+            let largest = |signal| shown.get(signal).unwrap().iter().copied().fold(f64::MIN, f64::max);
+            assert!(largest(Signal::GaugePressure) <= 1.005 * limits.most_pressure);
+            assert!(run.place.load_mass().is_none() || largest(Signal::Contraction) <= 1.005 * 0.2);
+        }
+    }
+}
+
+#[test]
+fn limits_that_leave_nothing_are_refused_with_a_sentence() {
+    let task = Task::of_effects(&["creep".to_owned(), "leakage".to_owned()], &[Signal::Force], &Parameters::default());
+    let limits = Limits { most_pressure: 1e4, ..limits(&[80.0]) };
+    let refused = plan::plan(&task.unwrap(), &Parameters::default(), DEFAULT_TOLERANCE, &limits, &|_| ()).unwrap_err();
+    assert!(refused.to_string().contains("the limits leave no experiment"), "{refused}");
+}
