@@ -16,7 +16,7 @@ const RIVAL: f64 = 3.0;
 /// did not see.
 const LEAST_EXPLAINED: (f64, f64) = (0.9, 0.7);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
-const LEAST_FURTHER: f64 = 0.9;
+const LEAST_FURTHER: f64 = 0.8;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
 /// Share of a signal's error that a named effect may leave without a further effect being looked for: a seventh of its
@@ -24,7 +24,7 @@ const NEGLIGIBLE: f64 = 0.25;
 const LEFT_BY_FORM: f64 = 0.02;
 /// How many times the structural error of a sound model an error must be to be called unexplained.
 const UNEXPLAINED: f64 = 4.0;
-/// Hypotheses that are carried on at each number of effects.
+/// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
 const BEAM: usize = 3;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
@@ -225,7 +225,7 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
         let mut next: Vec<Judged> = Vec::new();
-        for base in level.iter().take(BEAM) {
+        for base in bases(level) {
             for judged in self.extend(&base.fitted, starts) {
                 let same = |known: &Judged| known.fitted.hypothesis.names() == judged.fitted.hypothesis.names();
                 match next.iter().position(same) {
@@ -331,6 +331,18 @@ impl<'a, 'b> Search<'a, 'b> {
         other.fitted.hypothesis.names() != best.fitted.hypothesis.names()
             && evidence(&other.fitted, &best.fitted) < RIVAL
     }
+}
+
+/// The hypotheses that are carried on: the best, and for each signal the one that leaves least of it, since of two effects
+/// each may be alone in its signal.
+fn bases(level: &[Judged]) -> Vec<&Judged> {
+    let left: Vec<BTreeMap<Signal, f64>> = level.iter().map(|judged| beyond_noise(&judged.fitted.losses)).collect();
+    let signals = left.first().into_iter().flat_map(|left| left.keys());
+    let best_for = |signal: &Signal| (0..level.len()).min_by(|a, b| left[*a][signal].total_cmp(&left[*b][signal]));
+    let mut chosen: Vec<usize> = (0..level.len().min(BEAM)).chain(signals.filter_map(best_for)).collect();
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen.into_iter().map(|k| &level[k]).collect()
 }
 
 /// Effects that stand in the place of one in rivals that agree in all others.
