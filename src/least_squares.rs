@@ -32,7 +32,7 @@ pub struct Free {
 pub struct Effort {
     /// Most iterations.
     pub iterations: usize,
-    /// Relative decrease of the cost in one iteration below which nothing more is expected.
+    /// Relative decrease of the cost in one iteration below which a fit is at its end.
     pub small_decrease: f64,
 }
 
@@ -60,8 +60,8 @@ pub struct Fit {
     pub ended: Ended,
 }
 
-/// Damping above which no smaller step is worth a try.
-const LARGEST_DAMPING: f64 = 1e6;
+/// Steps of growing damping that are tried from one place.
+const TRIALS: usize = 5;
 
 /// What is minimised.
 struct Problem<'a, R> {
@@ -94,13 +94,14 @@ where
     for _ in 0..effort.iterations {
         let columns = problem.columns(&current);
         let (normal, gradient) = problem.normal_equations(&columns, &current);
-        let Some(better) = problem.better(&normal, &gradient, &current, &mut damping) else {
+        let least = effort.small_decrease * current.cost;
+        let Some(better) = problem.better(&normal, &gradient, &current, &mut damping, least) else {
             ended = Ended::Converged;
             break;
         };
         let decrease = current.cost - better.cost;
         current = better;
-        if decrease <= effort.small_decrease * current.cost {
+        if decrease <= least {
             ended = Ended::Converged;
             break;
         }
@@ -168,10 +169,20 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
         (normal, gradient)
     }
 
-    /// The next place whose cost is smaller, if there is one.
-    fn better(&self, normal: &DMatrix<f64>, gradient: &DVector<f64>, from: &Place, damping: &mut f64) -> Option<Place> {
-        while *damping <= LARGEST_DAMPING {
+    /// The next place whose cost is smaller, if there is one that is worth the way.
+    fn better(
+        &self,
+        normal: &DMatrix<f64>,
+        gradient: &DVector<f64>,
+        from: &Place,
+        damping: &mut f64,
+        least: f64,
+    ) -> Option<Place> {
+        for _ in 0..TRIALS {
             let trial = step(normal, gradient, self.free, &from.parameters, *damping);
+            if self.expected_decrease(normal, gradient, from, &trial) < least {
+                return None;
+            }
             if let Some(better) = self.place(&trial).filter(|trial| trial.cost < from.cost) {
                 *damping = (*damping * 0.1).max(1e-12);
                 return Some(better);
@@ -179,6 +190,12 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
             *damping *= 10.0;
         }
         None
+    }
+
+    /// Decrease of the cost that the derivatives promise for a step.
+    fn expected_decrease(&self, normal: &DMatrix<f64>, gradient: &DVector<f64>, from: &Place, trial: &[f64]) -> f64 {
+        let step = DVector::from_fn(trial.len(), |k, _| (trial[k] - from.parameters[k]) / self.free[k].typical);
+        -2.0 * gradient.dot(&step) - (normal * &step).dot(&step)
     }
 }
 
@@ -197,6 +214,24 @@ pub fn normal_matrix(columns: &[Vec<f64>]) -> DMatrix<f64> {
         }
     }
     normal
+}
+
+/// How much Σ r² can decrease when columns are added to the residuals in amounts within bounds.
+///
+/// Coordinate descent on the quadratic, which is convex; a hundred sweeps are plenty for a forecast.
+pub fn linear_decrease(residuals: &[f64], columns: &[Vec<f64>], free: &[Free]) -> f64 {
+    let normal = normal_matrix(columns);
+    let gradient: Vec<f64> = columns.iter().map(|column| dot(column, residuals)).collect();
+    let mut amounts = DVector::zeros(columns.len());
+    for _ in 0..100 {
+        for k in 0..columns.len() {
+            let slope = gradient[k] + normal.row(k).transpose().dot(&amounts);
+            let change = if normal[(k, k)] > 0.0 { -slope / normal[(k, k)] } else { 0.0 };
+            amounts[k] = f64::clamp(amounts[k] + change, free[k].lower, free[k].upper);
+        }
+    }
+    let linear: f64 = gradient.iter().zip(amounts.iter()).map(|(g, a)| g * a).sum();
+    -2.0 * linear - (&normal * &amounts).dot(&amounts)
 }
 
 fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, free: &[Free], parameters: &[f64], damping: f64) -> Vec<f64> {

@@ -325,6 +325,8 @@ fn a_correction_without_a_cause_is_neutral_until_it_acts_on_something() {
 
 #[test]
 fn every_form_of_every_effect_acts_on_the_plant() {
+    let mut still = Parameters::default();
+    still.initial.gauge_pressure = 2e5;
     let course = |parameters: &Parameters| {
         let mut model = plants().next().unwrap();
         run(model.as_mut(), parameters, 50);
@@ -332,14 +334,15 @@ fn every_form_of_every_effect_acts_on_the_plant() {
     };
     for effect in Effects::DESCRIPTIONS {
         for form in effect.forms {
-            let mut on = Parameters::default();
+            let mut on = still;
             form.iter().for_each(|(name, starts)| on.set(name, starts[0]).unwrap());
-            assert_ne!(course(&Parameters::default()), course(&on), "{form:?}");
+            assert_ne!(course(&still), course(&on), "{form:?}");
         }
         for (refinement, starts) in effect.refinements {
-            let [mut with, mut without] = [Parameters::default(); 2];
-            for (name, starts) in effect.forms.iter().copied().flatten() {
-                [&mut with, &mut without].map(|parameters| parameters.set(name, starts[0]).unwrap());
+            let [mut with, mut without] = [still; 2];
+            for (name, starts) in effect.forms.iter().copied().flatten().chain(effect.refinements) {
+                with.set(name, starts[0]).unwrap();
+                without.set(name, starts[0]).unwrap();
             }
             without.set(refinement, Parameters::default().get(refinement).unwrap()).unwrap();
             with.set(refinement, starts[0]).unwrap();

@@ -159,8 +159,8 @@ fn gaps_are_named() {
     // 4 s of every 5 s at a twentieth of the rate.
     let uneven = spoilt_times(|k| k % 400 < 320 && k % 20 != 0);
     assert!(found(&[uneven]).unwrap().iter().any(|note| note.contains("sampling is uneven")));
-    let slow = spoilt_times(|k| k % 20 != 0);
-    assert_says(&note(slow), &["samples are 0.25", "dead time and resonance cannot be judged"]);
+    let slow = spoilt_times(|k| k % 8 != 0);
+    assert_says(&note(slow), &["samples are 0.1", "dead time and resonance cannot be judged"]);
 }
 
 /// The recording with prescribed motion without the rows for which a function of their number says so.
@@ -169,6 +169,13 @@ fn spoilt_times(drop: impl Fn(usize) -> bool) -> Recording {
     let text = std::fs::read_to_string(&path).unwrap();
     let kept: Vec<&str> = text.lines().enumerate().filter(|(k, _)| *k == 0 || !drop(k - 1)).map(|(_, l)| l).collect();
     Recording::parse(kept.join("\n").as_bytes(), &path, &[]).unwrap()
+}
+
+#[test]
+fn a_static_map_is_no_course_of_time() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/real/map/dmsp_20_300.csv");
+    let found = found(&[Recording::read(&path, &[]).unwrap()]).unwrap();
+    assert!(matches!(&found[..], [note] if note.contains("`contraction` leaps by 24 % of its range")), "{found:?}");
 }
 
 #[test]

@@ -80,8 +80,13 @@ fn an_ideal_muscle_is_far_too_strong_for_the_static_maps() {
 }
 
 #[test]
-fn only_gaps_and_constant_inputs_are_noted() {
-    let expected = ["in time, the longest of", "`command` is constant", "`contraction` is 0 mm throughout"];
+fn only_gaps_constant_inputs_and_static_maps_are_noted() {
+    let expected = [
+        "in time, the longest of",
+        "`command` is constant",
+        "`contraction` is 0 mm throughout",
+        "`contraction` leaps by",
+    ];
     for (folder, parameters) in
         [("cylinder", "cylinder/cylinder_25.toml"), ("chamber", "chamber/shut.toml"), ("map", "map/dmsp_20_300.toml")]
     {

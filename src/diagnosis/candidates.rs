@@ -2,7 +2,7 @@
 
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::{Description, Freed};
-use crate::least_squares::{self, Effort, Ended, Free, derivatives, normal_matrix};
+use crate::least_squares::{self, Effort, Ended, Free, derivatives, linear_decrease, normal_matrix};
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
 use nalgebra::DMatrix;
@@ -14,9 +14,9 @@ const SHAPES: [&str; 3] = ["muscle.area_tilt", "muscle.area_bend", "muscle.elast
 /// Expected size of a correction of shape, as a share of the declared tolerance.
 const SHAPE_SHARE: f64 = 0.2;
 /// Of a fit that only has to show what a hypothesis is worth.
-const ROUGH: Effort = Effort { iterations: 12, small_decrease: 1e-3 };
+const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
 /// Of a fit whose parameters count.
-const EXACT: Effort = Effort { iterations: 30, small_decrease: 1e-6 };
+const EXACT: Effort = Effort { iterations: 20, small_decrease: 1e-5 };
 
 /// A parameter as fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,9 +45,11 @@ pub struct Part {
 }
 
 impl Part {
-    fn freed(self) -> impl Iterator<Item = &'static Freed> {
+    /// The free parameters; a refinement that the form has already is not counted twice.
+    pub fn freed(self) -> impl Iterator<Item = &'static Freed> {
+        let form = self.effect.forms[self.form];
         let refinements: &'static [Freed] = if self.refined { self.effect.refinements } else { &[] };
-        self.effect.forms[self.form].iter().chain(refinements)
+        form.iter().chain(refinements.iter().filter(|(name, _)| form.iter().all(|(known, _)| known != name)))
     }
 }
 
@@ -62,6 +64,11 @@ impl Hypothesis {
     /// With one effect more.
     pub fn with(&self, part: Part) -> Self {
         Self { parts: self.parts.iter().copied().chain([part]).collect() }
+    }
+
+    /// With one effect less.
+    pub fn without(&self, effect: &str) -> Self {
+        Self { parts: self.parts.iter().copied().filter(|part| part.effect.name != effect).collect() }
     }
 
     /// Names of the effects, sorted.
@@ -91,6 +98,15 @@ pub(super) fn declared(parameters: &Parameters, name: &str) -> (&'static Variabl
     parameters.find(name).unwrap_or_else(|| panic!("`{name}` is declared"))
 }
 
+/// Parameters with one effect at its neutral defaults.
+pub fn neutralised(parameters: &Parameters, effect: &Description) -> Parameters {
+    let (mut parameters, default) = (*parameters, Parameters::default());
+    parameters.visit_mut(&mut |variable, old| {
+        if variable.group() == effect.name { declared(&default, variable.name).1 } else { old }
+    });
+    parameters
+}
+
 /// Parameters with some of them set.
 pub(super) fn with_values(base: &Parameters, variables: &[&'static Variable], values: &[f64]) -> Parameters {
     let mut parameters = *base;
@@ -111,6 +127,19 @@ pub struct Fitted {
     pub residuals: Vec<f64>,
     /// How large they are, on all samples.
     pub losses: Vec<Loss>,
+}
+
+/// Where a fit starts.
+#[derive(Clone)]
+pub struct Start {
+    /// Share of the weighted squares of the residuals that may go away.
+    pub promise: f64,
+    /// The effect that is added.
+    pub part: Part,
+    /// Which of the starts of its form.
+    pub choice: usize,
+    /// The model.
+    pub parameters: Parameters,
 }
 
 /// Corrections that every fit may make of a nominal model that is good to `tolerance`, with their bounds and priors.
@@ -223,54 +252,50 @@ impl<'a> Bench<'a> {
         Fitted { hypothesis: hypothesis.clone(), parameters, residuals, losses }
     }
 
-    /// Where fits of a hypothesis with one effect more start: every start of every form, the most promising first.
+    /// Where fits of a hypothesis with one effect more start, the most promising first: every start of every form.
     ///
     /// How promising is judged from one simulation: how much of the weighted squares of the residuals goes away when the
     /// change that the effect makes is scaled and the corrections and the parameters so far adapt, to first order.
-    pub fn starts(&self, base: &Fitted, effect: &'static Description) -> Vec<(f64, Part, Parameters)> {
-        let residuals = weighted(&base.residuals, &self.weights);
-        let mut starts = Vec::new();
-        for form in 0..effect.forms.len() {
+    pub fn starts(&self, base: &Fitted, effect: &'static Description) -> Vec<Start> {
+        let forms = (0..effect.forms.len()).flat_map(|form| {
             let part = Part { effect, form, refined: false };
             let most = part.freed().map(|(_, starts)| starts.len()).max().unwrap_or(0);
-            for k in 0..most {
-                let mut start = base.parameters;
-                for (name, values) in part.freed() {
-                    let value = values.get(k).or(values.last()).copied().unwrap_or_default();
-                    start = with_values(&start, &[declared(&start, name).0], &[value]);
-                }
-                if let Some(changed) = self.data.residuals(&start) {
-                    let change: Vec<f64> = weighted(&changed, &self.weights)
-                        .iter()
-                        .zip(&residuals)
-                        .map(|(after, before)| after - before)
-                        .collect();
-                    starts.push((self.promise(&residuals, change), part, start));
-                }
-            }
-        }
-        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+            (0..most).map(move |choice| (part, choice))
+        });
+        let mut starts: Vec<Start> = forms.filter_map(|(part, choice)| self.start(base, part, choice)).collect();
+        starts.sort_by(|a, b| b.promise.total_cmp(&a.promise));
         starts
     }
 
-    /// Share of the squares that goes away when a change is scaled, up to five times, and the corrections adapt.
+    /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.
+    pub fn start(&self, base: &Fitted, part: Part, choice: usize) -> Option<Start> {
+        let mut parameters = base.parameters;
+        for (name, values) in part.freed() {
+            let value = values.get(choice).or(values.last()).copied().unwrap_or_default();
+            parameters = with_values(&parameters, &[declared(&parameters, name).0], &[value]);
+        }
+        let changed = self.data.residuals(&parameters)?;
+        let change = changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect::<Vec<_>>();
+        let change = weighted(&change, &self.weights);
+        // What shows nothing at a usual size cannot be told from nothing.
+        if change.iter().map(|c| c * c).sum::<f64>() < 1.0 {
+            return None;
+        }
+        let promise = self.promise(&weighted(&base.residuals, &self.weights), change);
+        Some(Start { promise, part, choice, parameters })
+    }
+
+    /// Share of the squares that goes away when a change is scaled, up to five times in either direction, and the
+    /// corrections adapt.
     fn promise(&self, residuals: &[f64], change: Vec<f64>) -> f64 {
-        let scale = Free { start: 0.0, lower: 0.0, upper: 5.0, typical: 1.0, prior: None };
+        let scale = Free { start: 0.0, lower: -5.0, upper: 5.0, typical: 1.0, prior: None };
         let (mut free, mut columns) = (vec![scale], vec![change]);
         for ((_, correction), slope) in self.corrections.iter().zip(&self.slopes) {
             let size = 2.0 * correction.typical;
             free.push(Free { start: 0.0, lower: -size, upper: size, prior: None, ..*correction });
             columns.push(weighted(slope, &self.weights));
         }
-        let changed = |values: &[f64]| {
-            let mut changed = residuals.to_vec();
-            for (value, column) in values.iter().zip(&columns) {
-                changed.iter_mut().zip(column).for_each(|(r, slope)| *r += value * slope);
-            }
-            Some(changed)
-        };
-        let fit = least_squares::fit(&changed, &free, &columns, ROUGH);
-        1.0 - fit.cost / residuals.iter().map(|r| r * r).sum::<f64>()
+        linear_decrease(residuals, &columns, &free) / residuals.iter().map(|r| r * r).sum::<f64>()
     }
 
     fn everything_free(&self, hypothesis: &Hypothesis, start: &Parameters) -> (Vec<&'static Variable>, Vec<Free>) {

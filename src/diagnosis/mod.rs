@@ -8,17 +8,21 @@
 
 mod candidates;
 mod correction;
+mod links;
 mod noise;
 pub mod plan;
+mod remaining;
 pub mod report;
 mod residuals;
 mod selection;
 
 pub use candidates::FittedParameter;
 pub use correction::Correction;
+pub use remaining::Remaining;
 
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
+use crate::quality;
 use crate::simulation::replay;
 use crate::variables::Declared;
 use crate::{Error, Result};
@@ -115,6 +119,10 @@ pub struct Diagnosis {
     pub corrections: Vec<FittedParameter>,
     /// Where the cause is unknown: a smooth correction without one, which explains nothing. No part of `extended`.
     pub correction: Option<Correction>,
+    /// What a person should know about the input.
+    pub notes: Vec<String>,
+    /// What the error that is left goes with.
+    pub remaining: Vec<Remaining>,
 }
 
 /// Diagnoses recordings against a nominal model.
@@ -130,6 +138,7 @@ pub fn diagnose(
     tolerance: f64,
     done: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis> {
+    let notes = quality::notes(recordings, nominal)?;
     for recording in recordings {
         replay(nominal, recording)?; // a model that cannot be simulated at all is the user's to mend
     }
@@ -137,30 +146,31 @@ pub fn diagnose(
         path: recordings[0].path.clone(),
         problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
     };
-    let mut bench = Bench::new(Data::new(recordings, nominal)?, nominal, tolerance);
+    let mut bench = Bench::new(Data::new(recordings, nominal, tolerance)?, nominal, tolerance);
     let first = bench.baseline().ok_or_else(cannot_follow)?;
     bench.refine_noise(&first.residuals);
     let baseline = bench.baseline().ok_or_else(cannot_follow)?;
     done("nominal");
-    let chosen = Search::new(&mut bench, baseline, tolerance).run(done).ok_or_else(cannot_follow)?;
-    Ok(answer(&bench, nominal, chosen).ok_or_else(cannot_follow)?)
+    let chosen = Search::new(&mut bench, baseline).run(done).ok_or_else(cannot_follow)?;
+    answer(&bench, nominal, &chosen, notes).ok_or_else(cannot_follow)
 }
 
 /// The choice in words and figures.
-fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnosis> {
+fn answer(bench: &Bench, nominal: &Parameters, chosen: &Chosen, notes: Vec<String>) -> Option<Diagnosis> {
     let data = &bench.data;
     let nominal_residuals = data.residuals(nominal)?;
     let (parameters, corrections) = bench.intervals(&chosen.model, Scope::Training);
     let nominal_errors = data.held_out_rms(&nominal_residuals);
     let mut extended = chosen.model.parameters;
-    let mut extended_errors = data.held_out_rms(&chosen.model.residuals);
+    let mut left = chosen.model.residuals.clone();
+    let mut extended_errors = data.held_out_rms(&left);
     let weighted = |errors: &BTreeMap<Signal, f64>| {
         let squares = errors.iter().map(|(signal, rms)| (rms / data.noise(*signal).level).powi(2));
         squares.sum::<f64>().sqrt()
     };
     // Corrections that do not help on unseen samples are not made.
     if chosen.model.hypothesis.parts.is_empty() && weighted(&extended_errors) > weighted(&nominal_errors) {
-        (extended, extended_errors) = (*nominal, nominal_errors.clone());
+        (extended, extended_errors, left) = (*nominal, nominal_errors.clone(), nominal_residuals);
     }
     let (before, after) = (weighted(&nominal_errors), weighted(&extended_errors));
     let signals = nominal_errors.iter().map(|(signal, nominal_rms)| SignalErrors {
@@ -179,13 +189,15 @@ fn answer(bench: &Bench, nominal: &Parameters, chosen: Chosen) -> Option<Diagnos
     Some(Diagnosis {
         verdict: chosen.verdict,
         correction: if unexplained { correction::correction(bench, &extended) } else { None },
-        causes: causes(&chosen, nominal, &parameters),
+        causes: causes(chosen, nominal, &parameters),
         signals: signals.collect(),
         improvement: if before > 0.0 { 1.0 - after / before } else { 0.0 },
         held_out: data.held_out(),
         ranking: chosen.singles.iter().map(baseline).collect(),
         extended,
         corrections,
+        notes,
+        remaining: remaining::remaining(data, &extended, &left),
     })
 }
 

@@ -15,6 +15,9 @@ const TRAINING_SHARE: f64 = 0.6;
 const FEWEST_SAMPLES: usize = 50;
 /// Longest time in s over which neighbouring residuals are expected to hang together.
 const LONGEST_CORRELATION: f64 = 3.0;
+/// Structural error of a nominal muscle beyond its coefficients, as a share of the declared tolerance and of the span of
+/// the signal: a polynomial is never quite the muscle.
+const STRUCTURE_SHARE: f64 = 0.05;
 /// No sensor is better than this share of what it shows: data without any noise are simulated.
 const FINEST: f64 = 1e-5;
 
@@ -35,6 +38,7 @@ pub struct Data<'a> {
     held_out_from: Vec<f64>,
     segments: Vec<Segment>,
     noise: BTreeMap<Signal, Noise>,
+    tolerance: f64,
 }
 
 /// How large the residuals of one signal in one recording are.
@@ -46,6 +50,8 @@ pub struct Loss {
     pub samples: usize,
     /// Mean square relative to that of the noise.
     pub excess: f64,
+    /// Mean square that the structural error of a sound nominal model makes, relative to that of the noise.
+    pub structure: f64,
     /// Number of samples that are worth an independent one, judged from how these residuals hang together.
     pub effective: f64,
 }
@@ -66,7 +72,7 @@ impl<'a> Data<'a> {
     ///
     /// # Errors
     /// [`Error::Recording`] where a recording is too short, or no measured signal can be judged.
-    pub fn new(recordings: &'a [Recording], nominal: &Parameters) -> Result<Self> {
+    pub fn new(recordings: &'a [Recording], nominal: &Parameters, tolerance: f64) -> Result<Self> {
         if let Some(short) = recordings.iter().find(|recording| recording.time.len() < FEWEST_SAMPLES) {
             let problem = format!("too short for a diagnosis: it takes at least {FEWEST_SAMPLES} samples");
             return Err(Error::Recording { path: short.path.clone(), problem });
@@ -76,6 +82,7 @@ impl<'a> Data<'a> {
             held_out_from: last_recording(recordings),
             segments: segments(recordings, nominal)?,
             noise: BTreeMap::new(),
+            tolerance,
         };
         // The last of several recordings is held out, if all signals can be both fitted and judged then.
         if recordings.len() == 1 || !data.signals().into_iter().all(|signal| data.is_judged(signal)) {
@@ -132,9 +139,18 @@ impl<'a> Data<'a> {
     }
 
     /// Smallest span of a signal among the recordings, SI.
-    pub fn span(&self, signal: Signal) -> f64 {
+    fn span(&self, signal: Signal) -> f64 {
         let segments = self.segments.iter().filter(|segment| segment.signal == signal);
         segments.map(|segment| span(self.measured(segment))).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Mean square of the structural error of a sound nominal muscle relative to that of the noise. What comes before the
+    /// muscle has none: the declared tolerance is one of the muscle.
+    pub fn structure(&self, signal: Signal) -> f64 {
+        if signal == Signal::GaugePressure {
+            return 0.0;
+        }
+        (STRUCTURE_SHARE * self.tolerance * self.span(signal) / self.noise[&signal].level).powi(2)
     }
 
     /// Takes what a better model shows of the noise, where that is less.
@@ -159,8 +175,11 @@ impl<'a> Data<'a> {
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
     /// simulated.
     pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+        COUNT.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let t0 = std::time::Instant::now();
         let replays: Vec<_> =
             self.recordings.par_iter().map(|recording| replay(parameters, recording).ok()).collect::<Option<_>>()?;
+        TIME.fetch_add(t0.elapsed().as_micros() as usize, std::sync::atomic::Ordering::Relaxed);
         let mut all = Vec::with_capacity(self.segments.last().map_or(0, |segment| segment.range.end));
         for segment in &self.segments {
             let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);
@@ -186,6 +205,12 @@ impl<'a> Data<'a> {
 
     /// How large residuals are, per signal and recording.
     pub fn losses(&self, residuals: &[f64], scope: Scope) -> Vec<Loss> {
+        let t0 = std::time::Instant::now();
+        let out = self.losses0(residuals, scope);
+        TIME2.fetch_add(t0.elapsed().as_micros() as usize, std::sync::atomic::Ordering::Relaxed);
+        out
+    }
+    fn losses0(&self, residuals: &[f64], scope: Scope) -> Vec<Loss> {
         let in_scope = self.segments.iter().map(|segment| {
             let level = self.noise[&segment.signal].level;
             let both = segment.samples.iter().zip(&residuals[segment.range.clone()]);
@@ -199,9 +224,16 @@ impl<'a> Data<'a> {
                 signal: segment.signal,
                 samples: scaled.len(),
                 excess: mean_square(&scaled),
+                structure: self.structure(segment.signal),
                 effective: effective_samples(&scaled, self.period(segment.recording)),
             })
             .collect()
+    }
+
+    /// Logarithm of the likelihood of residuals, up to a constant, if they hang together no longer than the noise does.
+    pub fn log_likelihood(&self, losses: &[Loss]) -> f64 {
+        let of = |loss: &Loss| -0.5 * loss.samples as f64 / self.noise[&loss.signal].inflation * loss.excess.ln();
+        losses.iter().map(of).sum()
     }
 
     /// Residuals of a signal one by one: recording, position within it, residual in SI, and whether fits may see it.
@@ -367,3 +399,8 @@ mod tests {
         assert!((30.0..200.0).contains(&worth), "{worth}");
     }
 }
+
+pub static COUNT: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
+pub static TIME: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
+pub static TIME2: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
+pub fn count(what: &str) { if std::env::var("SINEW_TRACE").is_ok() { eprintln!("@{what} {} sim {} ms loss {} ms", COUNT.load(std::sync::atomic::Ordering::Relaxed), TIME.load(std::sync::atomic::Ordering::Relaxed)/1000, TIME2.load(std::sync::atomic::Ordering::Relaxed)/1000); } }

@@ -1,11 +1,10 @@
 //! Which causes are named, if any: forward selection over a beam of hypotheses, with refusal in both directions.
 
 use super::Verdict;
-use super::candidates::{Bench, Fitted, Part};
+use super::candidates::{Bench, Fitted, Part, Start, neutralised};
 use super::residuals::{Loss, Scope};
-use crate::effects::{Description, Effects};
+use crate::effects::Effects;
 use crate::measurement::Signal;
-use crate::parameters::Parameters;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -13,24 +12,24 @@ use std::collections::BTreeMap;
 const LEAST_EVIDENCE: f64 = 10.0;
 /// Odds up to which a rival explains the data as well as the best: 20 to 1, in natural logarithm.
 const RIVAL: f64 = 3.0;
-/// Share of the error beyond noise that the named causes together must explain.
-const LEAST_EXPLAINED: f64 = 0.7;
+/// Share of the error beyond noise that the named causes together must explain: of all samples, and of those that the fit
+/// did not see.
+const LEAST_EXPLAINED: (f64, f64) = (0.9, 0.8);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
-const LEAST_FURTHER: f64 = 0.6;
+const LEAST_FURTHER: f64 = 0.9;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
-/// Share of a signal's error that a named effect may leave without a further effect being looked for: a tenth of its rms
-/// is how the form of an effect differs from the true one.
-const LEFT_BY_FORM: f64 = 0.01;
-/// Structural error of a nominal muscle beyond its coefficients, as a share of the declared tolerance and of the span of
-/// the signal. It only keeps a small error from being called unexplained.
-const STRUCTURE_SHARE: f64 = 0.2;
+/// Share of a signal's error that a named effect may leave without a further effect being looked for: a seventh of its
+/// rms is how the form of an effect differs from the true one.
+const LEFT_BY_FORM: f64 = 0.02;
+/// How many times the structural error of a sound model an error must be to be called unexplained.
+const UNEXPLAINED: f64 = 4.0;
 /// Hypotheses that are carried on at each number of effects.
 const BEAM: usize = 3;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
 /// Candidates that are fitted, of those that look promising: for the first effect, and for further ones.
-const FITTED: (usize, usize) = (10, 5);
+const FITTED: (usize, usize) = (10, 7);
 /// Starts from which a candidate is fitted.
 const STARTS: usize = 2;
 
@@ -41,6 +40,8 @@ pub struct Judged {
     pub fitted: Fitted,
     /// Evidence against the baseline.
     pub evidence: f64,
+    /// Logarithm of its odds if nothing but noise were left, up to a constant: by this hypotheses are ranked.
+    score: f64,
     /// Share of the error beyond noise that is explained.
     pub explained: f64,
 }
@@ -62,8 +63,8 @@ pub struct Chosen {
 /// Logarithm of the odds for a hypothesis against another: gain of likelihood per signal and recording at the effective
 /// number of samples, less what its parameters cost (G. Schwarz 1978, doi 10.1214/aos/1176344136).
 ///
-/// The size of the residuals of each signal is taken as unknown, so that the ratio counts; how long they hang together is
-/// judged from the fit that the odds are for.
+/// The size of the residuals of each signal is taken as unknown, so that the ratio counts; the structural error that a sound
+/// model may have is added to them, and how long they hang together is judged from the fit that the odds are for.
 fn evidence(without: &Fitted, with: &Fitted) -> f64 {
     let samples: f64 = with.losses.iter().map(|loss| loss.effective).sum();
     let more = with.hypothesis.size() as f64 - without.hypothesis.size() as f64;
@@ -72,7 +73,8 @@ fn evidence(without: &Fitted, with: &Fitted) -> f64 {
 
 /// Gain of logarithmic likelihood.
 fn gain(without: &[Loss], with: &[Loss]) -> f64 {
-    without.iter().zip(with).map(|(b, a)| 0.5 * a.effective * (b.excess / a.excess).ln()).sum()
+    let ratio = |b: &Loss, a: &Loss| (b.excess + b.structure) / (a.excess + a.structure);
+    without.iter().zip(with).map(|(b, a)| 0.5 * a.effective * ratio(b, a).ln()).sum()
 }
 
 /// Mean squared residual per signal beyond that of the noise, relative to it.
@@ -94,35 +96,40 @@ fn total(beyond_noise: &BTreeMap<Signal, f64>) -> f64 {
 pub struct Search<'a, 'b> {
     bench: &'b mut Bench<'a>,
     baseline: Fitted,
-    tolerance: f64,
 }
 
 impl<'a, 'b> Search<'a, 'b> {
     /// A search from a baseline.
-    pub fn new(bench: &'b mut Bench<'a>, baseline: Fitted, tolerance: f64) -> Self {
-        Self { bench, baseline, tolerance }
+    pub fn new(bench: &'b mut Bench<'a>, baseline: Fitted) -> Self {
+        Self { bench, baseline }
     }
 
     fn judge(&self, fitted: Fitted) -> Judged {
         let evidence = evidence(&self.baseline, &fitted);
         let (before, after) = (beyond_noise(&self.baseline.losses), beyond_noise(&fitted.losses));
         let explained = 1.0 - total(&after) / total(&before).max(f64::MIN_POSITIVE);
-        Judged { fitted, evidence, explained }
+        let score = self.bench.data.log_likelihood(&fitted.losses)
+            - 0.5 * fitted.hypothesis.size() as f64 * (fitted.residuals.len() as f64).ln();
+        Judged { fitted, evidence, score, explained }
     }
 
     /// Finds the causes; `done` is told after each candidate.
     pub fn run(mut self, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
-        let mut singles = self.extend(&self.baseline, FITTED.0, done);
+        let (mut singles, starts) = self.singles(done);
         if let Some(best) = singles.first().filter(|best| best.evidence > LEAST_EVIDENCE) {
             let residuals = best.fitted.residuals.clone();
             self.bench.refine_noise(&residuals);
             singles = self.judged_anew(singles);
         }
+        super::residuals::count("singles");
         let mut levels = vec![self.refined_best(singles)];
+        super::residuals::count("refined");
         while levels.len() < MOST_EFFECTS && self.something_is_left(levels.last()?) {
-            let next = self.next_level(levels.last()?);
+            let next = self.next_level(levels.last()?, &starts);
             levels.push(next);
+            super::residuals::count("next");
         }
+        super::residuals::count("levels");
         self.trace(&levels);
         self.choose(levels)
     }
@@ -165,29 +172,39 @@ impl<'a, 'b> Search<'a, 'b> {
         sorted(fits.into_iter().map(|fitted| self.judge(fitted)).collect())
     }
 
-    /// The most promising hypotheses with one effect more, the best first.
-    fn extend(&self, base: &Fitted, most: usize, done: &(dyn Fn(&str) + Sync)) -> Vec<Judged> {
-        let others: Vec<&'static Description> =
-            Effects::DESCRIPTIONS.iter().filter(|effect| !base.hypothesis.has(effect.name)).collect();
-        let mut promising: Vec<_> = others
-            .into_par_iter()
+    /// Single effects, the best first, and from where each effect is best fitted.
+    fn singles(&self, done: &(dyn Fn(&str) + Sync)) -> (Vec<Judged>, Vec<(Part, usize)>) {
+        let starts: Vec<Vec<Start>> = Effects::DESCRIPTIONS
+            .par_iter()
             .map(|effect| {
-                let starts = self.bench.starts(base, effect);
+                let starts = self.bench.starts(&self.baseline, effect);
                 done(effect.name);
                 starts
             })
             .filter(|starts| !starts.is_empty())
             .collect();
-        promising.sort_by(|a, b| b[0].0.total_cmp(&a[0].0));
-        promising.truncate(most);
-        sorted(promising.into_par_iter().filter_map(|starts| self.best_fit(base, &starts)).collect())
+        let best = starts.iter().map(|starts| (starts[0].part, starts[0].choice)).collect();
+        (self.fitted(&self.baseline, starts, FITTED.0), best)
     }
 
-    fn best_fit(&self, base: &Fitted, starts: &[(f64, Part, Parameters)]) -> Option<Judged> {
-        let fits = starts.iter().take(STARTS).filter_map(|(_, part, start)| {
-            Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(*part), start)?))
-        });
-        fits.max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+    /// The most promising hypotheses with one effect more, the best first.
+    fn extend(&self, base: &Fitted, from: &[(Part, usize)]) -> Vec<Judged> {
+        let others = from.par_iter().filter(|(part, _)| !base.hypothesis.has(part.effect.name));
+        let starts = others.filter_map(|(part, choice)| Some(vec![self.bench.start(base, *part, *choice)?])).collect();
+        self.fitted(base, starts, FITTED.1)
+    }
+
+    /// Fits of the most promising effects, each from its most promising starts, the best first.
+    fn fitted(&self, base: &Fitted, mut starts: Vec<Vec<Start>>, most: usize) -> Vec<Judged> {
+        starts.sort_by(|a, b| b[0].promise.total_cmp(&a[0].promise));
+        starts.truncate(most);
+        let best = |starts: Vec<Start>| {
+            let fits = starts.iter().take(STARTS).filter_map(|start| {
+                Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &start.parameters)?))
+            });
+            fits.max_by(|a, b| a.score.total_cmp(&b.score))
+        };
+        sorted(starts.into_par_iter().filter_map(best).collect())
     }
 
     /// The same, the best of them with their last effect refined and fitted to the end: what a fit left undone would
@@ -209,32 +226,40 @@ impl<'a, 'b> Search<'a, 'b> {
         let Some(last) = hypothesis.parts.last_mut().filter(|part| !part.effect.refinements.is_empty()) else {
             return judged;
         };
+        if beyond_noise(&judged.fitted.losses).values().all(|left| *left <= NEGLIGIBLE) {
+            return judged;
+        }
+        let known: Vec<&str> = last.freed().map(|(name, _)| *name).collect();
         last.refined = true;
         let mut start = judged.fitted.parameters;
-        for (name, values) in last.effect.refinements {
+        for (name, values) in last.effect.refinements.iter().filter(|(name, _)| !known.contains(name)) {
             let _ = start.set(name, values[0]);
         }
         match self.bench.rough_fit(&hypothesis, &start).map(|fitted| self.judge(fitted)) {
-            Some(better) if better.evidence > judged.evidence => better,
+            Some(better) if better.score > judged.score => better,
             _ => judged,
         }
     }
 
     /// Whether the best of the hypotheses leaves an error that is worth a further effect.
     fn something_is_left(&self, level: &[Judged]) -> bool {
-        let Some(best) = level.first().filter(|best| best.evidence > LEAST_EVIDENCE) else { return false };
-        let before = beyond_noise(&self.baseline.losses);
-        let after = beyond_noise(&best.fitted.losses);
-        after.iter().any(|(signal, left)| *left > NEGLIGIBLE && *left > LEFT_BY_FORM * before[signal])
+        let best = level.first().filter(|best| best.evidence > LEAST_EVIDENCE);
+        best.is_some_and(|best| !self.is_enough(&best.fitted.losses)) && !self.is_sound(&self.baseline.losses)
     }
 
-    fn next_level(&self, level: &[Judged]) -> Vec<Judged> {
+    /// Whether residuals are small enough that nothing more is looked for.
+    fn is_enough(&self, losses: &[Loss]) -> bool {
+        let (before, after) = (beyond_noise(&self.baseline.losses), beyond_noise(losses));
+        after.iter().all(|(signal, left)| *left <= NEGLIGIBLE.max(LEFT_BY_FORM * before[signal]))
+    }
+
+    fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
         let mut next: Vec<Judged> = Vec::new();
         for base in level.iter().take(BEAM) {
-            for judged in self.extend(&base.fitted, FITTED.1, &|_| ()) {
+            for judged in self.extend(&base.fitted, starts) {
                 let same = |known: &Judged| known.fitted.hypothesis.names() == judged.fitted.hypothesis.names();
                 match next.iter().position(same) {
-                    Some(k) if next[k].evidence < judged.evidence => next[k] = judged,
+                    Some(k) if next[k].score < judged.score => next[k] = judged,
                     Some(_) => (),
                     None => next.push(judged),
                 }
@@ -243,35 +268,44 @@ impl<'a, 'b> Search<'a, 'b> {
         self.refined_best(sorted(next))
     }
 
-    /// Error beyond noise that is no reason to call a model wrong.
-    fn allowance(&self, signal: Signal) -> f64 {
-        let level = self.bench.data.noise(signal).level;
-        // The declared tolerance is one of the muscle; what comes before it has none.
-        let structure = if signal == Signal::GaugePressure {
-            0.0
-        } else {
-            STRUCTURE_SHARE * self.tolerance * self.bench.data.span(signal)
-        };
-        NEGLIGIBLE + (structure / level).powi(2)
-    }
-
+    /// Whether an error is no reason to call a model wrong.
     fn is_sound(&self, losses: &[Loss]) -> bool {
-        beyond_noise(losses).into_iter().all(|(signal, beyond)| beyond <= self.allowance(signal))
+        let allowance = |signal| NEGLIGIBLE + UNEXPLAINED.powi(2) * self.bench.data.structure(signal);
+        beyond_noise(losses).into_iter().all(|(signal, beyond)| beyond <= allowance(signal))
     }
 
-    /// The best hypothesis of all levels: a further effect must pay and explain a good part of what is left.
-    fn best<'l>(&self, levels: &'l [Vec<Judged>]) -> Option<&'l Judged> {
+    /// The best hypothesis of all levels, without effects that it can spare.
+    fn best(&self, levels: &[Vec<Judged>]) -> Option<Judged> {
         let mut best = levels[0].first().filter(|best| best.evidence > LEAST_EVIDENCE)?;
         for level in &levels[1..] {
-            let Some(more) = level.first() else { break };
-            let left = total(&beyond_noise(&best.fitted.losses));
-            let further = 1.0 - total(&beyond_noise(&more.fitted.losses)) / left.max(f64::MIN_POSITIVE);
-            if more.evidence < best.evidence + LEAST_EVIDENCE || further < LEAST_FURTHER {
-                break;
-            }
+            let Some(more) = level.first().filter(|more| self.is_worth(best, more)) else { break };
             best = more;
         }
-        Some(best)
+        Some(self.pruned(best.clone()))
+    }
+
+    /// Whether a hypothesis with more effects is worth them: it pays, and explains a good part of what is left without.
+    fn is_worth(&self, fewer: &Judged, more: &Judged) -> bool {
+        let left = total(&beyond_noise(&fewer.fitted.losses));
+        let further = 1.0 - total(&beyond_noise(&more.fitted.losses)) / left.max(f64::MIN_POSITIVE);
+        evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE && further > LEAST_FURTHER
+    }
+
+    /// Drops effects that a hypothesis of several can spare, the most superfluous first.
+    fn pruned(&self, judged: Judged) -> Judged {
+        let parts = judged.fitted.hypothesis.parts.clone();
+        if parts.len() < 2 {
+            return judged;
+        }
+        let fewer = parts.par_iter().filter_map(|part| {
+            let start = neutralised(&judged.fitted.parameters, part.effect);
+            let hypothesis = judged.fitted.hypothesis.without(part.effect.name);
+            Some(self.judge(self.bench.exact_fit(&hypothesis, &start, Scope::All)?))
+        });
+        match fewer.max_by(|a, b| a.score.total_cmp(&b.score)) {
+            Some(fewer) if !self.is_worth(&fewer, &judged) => self.pruned(fewer),
+            _ => judged,
+        }
     }
 
     fn choose(self, levels: Vec<Vec<Judged>>) -> Option<Chosen> {
@@ -282,13 +316,13 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
         let Some(best) = self.best(&levels) else { return refused(wrong) };
-        if best.explained < LEAST_EXPLAINED || !self.holds(&best.fitted)? {
+        if best.explained < LEAST_EXPLAINED.0 || !self.holds(&best.fitted)? {
             return refused(wrong);
         }
         let rivals: Vec<&Judged> =
-            levels[best.fitted.hypothesis.parts.len() - 1].iter().filter(|other| self.is_rival(best, other)).collect();
+            levels[best.fitted.hypothesis.parts.len() - 1].iter().filter(|other| self.is_rival(&best, other)).collect();
         let alternatives: Vec<Vec<&'static str>> =
-            best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, best, &rivals)).collect();
+            best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
         let verdict = if alternatives.iter().any(|a| !a.is_empty()) {
             Verdict::Ambiguous
         } else if self.is_sound(&best.fitted.losses) {
@@ -298,6 +332,7 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
+        super::residuals::count("chosen");
         Some(Chosen { verdict, model, alternatives, rivals, singles })
     }
 
@@ -308,7 +343,8 @@ impl<'a, 'b> Search<'a, 'b> {
             Some(self.bench.data.losses(&trained.residuals, Scope::HeldOut))
         };
         let (without, with) = (on_unseen(&self.baseline)?, on_unseen(fitted)?);
-        Some(gain(&without, &with) > 0.0)
+        let explained = 1.0 - total(&beyond_noise(&with)) / total(&beyond_noise(&without)).max(f64::MIN_POSITIVE);
+        Some(gain(&without, &with) > 0.0 && explained > LEAST_EXPLAINED.1)
     }
 
     fn is_rival(&self, best: &Judged, other: &Judged) -> bool {
@@ -328,6 +364,6 @@ fn in_place_of(effect: &str, best: &Judged, rivals: &[&Judged]) -> Vec<&'static 
 }
 
 fn sorted(mut judged: Vec<Judged>) -> Vec<Judged> {
-    judged.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    judged.sort_by(|a, b| b.score.total_cmp(&a.score));
     judged
 }

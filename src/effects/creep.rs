@@ -47,7 +47,7 @@ impl Effect for Creep {
         forms: &[&[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])]],
         refinements: &[
             ("creep.amplitude_2", &[0.05]),
-            ("creep.time_2", &[20.0, 0.5]),
+            ("creep.time_2", &[15.0, 0.5]),
             ("creep.relaxed_share", &[0.5]),
             ("creep.settled_share", &[0.5]),
         ],

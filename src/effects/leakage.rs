@@ -2,6 +2,8 @@ use super::{AMBIENT_PRESSURE, Description, Effect, Point};
 
 /// Ratio of pressures below which the flow through a hole is choked: a sharp edge.
 const CRITICAL_RATIO: f64 = 0.3;
+/// Gauge pressure in Pa at which a porous wall leaks alike whatever its exponent.
+const REFERENCE_PRESSURE: f64 = 2e5;
 /// Gauge pressure in Pa over which the last of the flow through a hole fades; not physical, it keeps the slope finite.
 const FADE: f64 = 500.0;
 
@@ -9,8 +11,8 @@ crate::variables::variables! {
     /// Air that is lost while the valve goes on blowing.
     ///
     /// # Model
-    /// dp/dt ← dp/dt − k ((1 − c) p + c (p + p_a) ψ(p)) / (1 + `volume_growth` x/0.1 m): `rate` k, `choked_share` c of
-    /// the leak that is a hole and not a porous wall. ψ = 1 while the flow is choked, p_a/(p + p_a) < b = 0.3, and
+    /// dp/dt ← dp/dt − k ((1 − c) p (p/2 bar)^(e−1) + c (p + p_a) ψ(p)) / (1 + `volume_growth` x/0.1 m): `rate` k,
+    /// `exponent` e, `choked_share` c of the leak that is a hole and not a porous wall. ψ = 1 while the flow is choked, p_a/(p + p_a) < b = 0.3, and
     /// √(1 − ((p_a/(p + p_a) − b)/(1 − b))²) above. The pressure cannot fall below ambient.
     ///
     /// # In the data
@@ -27,6 +29,8 @@ crate::variables::variables! {
         rate: f64 = 0.0, PER_SECOND, (0.0..=50.0);
         /// Share of the leak that is a hole, with flow in proportion to absolute pressure
         choked_share: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Power of the gauge pressure in what is lost through a porous wall, 1 at 2 bar
+        exponent: f64 = 1.0, ONE, (0.3..=3.0);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
     }
@@ -40,17 +44,35 @@ fn hole(gauge_pressure: f64) -> f64 {
     absolute * (1.0 - subsonic * subsonic).max(0.0).sqrt() * gauge_pressure / (gauge_pressure + FADE)
 }
 
+impl Leakage {
+    /// What is lost at a gauge pressure in Pa, in Pa: times the rate it is a loss per time.
+    fn flow(&self, gauge_pressure: f64) -> f64 {
+        let mut porous = gauge_pressure;
+        if self.exponent != 1.0 {
+            porous *= (gauge_pressure / REFERENCE_PRESSURE).powf(self.exponent - 1.0).min(1e3);
+        }
+        if self.choked_share == 0.0 {
+            return porous;
+        }
+        (1.0 - self.choked_share) * porous + self.choked_share * hole(gauge_pressure)
+    }
+}
+
 impl Effect for Leakage {
     const DESCRIPTION: Description = Description {
         name: "leakage",
         meaning: "pressure is lost in proportion to pressure",
-        equation: "dp/dt <- dp/dt - k ((1 - c) p + c (p + p_a) psi(p))",
+        equation: "dp/dt <- dp/dt - k ((1 - c) p (p/2 bar)^(e-1) + c (p + p_a) psi(p))",
         signature: "decay with the valve shut; shortfall of the pressure while regulated, and a faster response",
         experiment: "shut the valve and watch the pressure for a minute",
         reference: "ISO 6358",
         of_load: false,
         forms: &[&[("leakage.rate", &[0.3, 1.0])], &[("leakage.rate", &[0.3, 1.0]), ("leakage.choked_share", &[0.5])]],
-        refinements: &[("leakage.choked_share", &[0.5]), ("leakage.volume_growth", &[0.3])],
+        refinements: &[
+            ("leakage.choked_share", &[0.5]),
+            ("leakage.volume_growth", &[0.3]),
+            ("leakage.exponent", &[1.3]),
+        ],
     };
 
     fn is_neutral(&self) -> bool {
@@ -62,15 +84,11 @@ impl Effect for Leakage {
             return rate;
         }
         let pressure = at.gauge_pressure.max(0.0);
-        let mut flow = (1.0 - self.choked_share) * pressure;
-        if self.choked_share > 0.0 {
-            flow += self.choked_share * hole(pressure);
-        }
-        rate - self.rate * flow / (1.0 + self.volume_growth * at.relative_contraction()).max(0.1)
+        rate - self.rate * self.flow(pressure) / (1.0 + self.volume_growth * at.relative_contraction()).max(0.1)
     }
 
     fn sentence(&self) -> String {
-        let at_two_bar = self.rate * ((1.0 - self.choked_share) * 2e5 + self.choked_share * hole(2e5));
+        let at_two_bar = self.rate * self.flow(REFERENCE_PRESSURE);
         format!("The muscle leaks: at 2 bar it loses {:.2} bar per second.", at_two_bar * 1e-5)
     }
 }

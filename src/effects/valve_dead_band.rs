@@ -31,6 +31,14 @@ crate::variables::variables! {
     }
 }
 
+/// Every jump depends on the ones before, so that the error of a fit has many minima: the starts are close, in V.
+#[rustfmt::skip]
+const STICTION_STARTS: &[f64] = &[
+    0.030, 0.032, 0.035, 0.037, 0.040, 0.043, 0.047, 0.050, 0.054, 0.058,
+    0.062, 0.067, 0.072, 0.078, 0.083, 0.090, 0.097, 0.104, 0.112, 0.120,
+    0.129, 0.139, 0.150, 0.161, 0.173, 0.187, 0.201, 0.216, 0.232, 0.250,
+];
+
 impl Effect for ValveDeadBand {
     const DESCRIPTION: Description = Description {
         name: "valve_dead_band",
@@ -41,8 +49,8 @@ impl Effect for ValveDeadBand {
         reference: "Choudhury et al. 2005",
         of_load: false,
         forms: &[
-            &[("valve_dead_band.play", &[0.05, 0.15])],
-            &[("valve_dead_band.stiction", &[0.08, 0.2])],
+            &[("valve_dead_band.play", &[0.03, 0.08, 0.15])],
+            &[("valve_dead_band.stiction", STICTION_STARTS)],
             &[("valve_dead_band.pressure_overlap", &[5e3])],
         ],
         refinements: &[("valve_dead_band.start", &[0.3, -0.3])],

@@ -1,6 +1,6 @@
 //! When samples were taken: gaps, uneven and slow sampling, and what a recording is too short for.
 
-use super::{quantile, rounded};
+use super::{present, quantile, rounded, span};
 use crate::effects::Effects;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
@@ -11,6 +11,9 @@ use crate::variables::units::SECOND;
 const GAP: f64 = 10.0;
 /// Sampling is uneven where its slow and fast intervals are a decade apart: neighbours then no longer mean the same time.
 const UNEVEN: f64 = 10.0;
+/// A motion by such a share of its range between samples is not followed: nine neighbours, over which noise and velocity
+/// are estimated, span nearly half the range.
+const LEAP: f64 = 0.05;
 /// A column that mostly is not there.
 const MOSTLY: f64 = 0.5;
 
@@ -32,6 +35,7 @@ pub fn notes(recording: &Recording, parameters: &Parameters) -> Vec<String> {
     let inputs_and_outputs = OUTPUTS.into_iter().chain([Signal::Command]);
     notes.extend(inputs_and_outputs.filter_map(|signal| missing(recording, signal, longest_allowed)));
     notes.extend(uneven(&intervals));
+    notes.extend(leaps(recording));
     notes.extend(valve_time.filter(|time| usual > *time).map(|time| {
         format!(
             "samples are {} s apart and the valve answers within {} s: its lag, dead time and resonance cannot be judged",
@@ -84,6 +88,21 @@ fn uneven(intervals: &[f64]) -> Option<String> {
         )
     };
     (slow > UNEVEN * fast).then(text)
+}
+
+/// A motion that is not followed from sample to sample, as in a static map.
+fn leaps(recording: &Recording) -> Option<String> {
+    let known = present(recording.get(Signal::Contraction)?);
+    let moves: Vec<f64> = known.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let share = quantile(&moves, 0.5)? / span(&known);
+    let text = || {
+        format!(
+            "`contraction` leaps by {:.0} % of its range from sample to sample: velocity and noise cannot be estimated, and \
+             nothing that depends on time or direction can be judged",
+            100.0 * share
+        )
+    };
+    (share > LEAP).then(text)
 }
 
 /// Effects that are slower than the longest recording.

@@ -1,4 +1,4 @@
-"""The hidden effects, in forms of their own: none is the textbook form that a diagnosis would fit.
+"""The hidden effects, in near forms: the families of the tool hold them, or nearly so. The far ones are in far.py.
 
 A form has `sizes(random, severity)` (its parameters for one case) and hooks that act on its columns `at`:
 `drive` on the commands before the run, `stretch` on the contraction as the muscle feels it, `act` on force and damping,
@@ -233,9 +233,11 @@ class StretchyCable(Form):
         now.strain[self.at] += self.stretched
 
     def act(self, now):
-        pull = np.maximum(now.force[self.at], 0)
-        wanted = self.compliance * 400 * (pull / 400) ** 0.85
+        wanted = self.stretch_of(np.maximum(now.force[self.at], 0))
         self.stretched += 0.3 * (wanted - self.stretched)  # settles within a few steps
+
+    def stretch_of(self, pull):
+        return self.compliance * 400 * (pull / 400) ** 0.85
 
 
 class HeavierLoad(Form):
@@ -251,6 +253,17 @@ class HeavierLoad(Form):
 
     def begin(self, now):
         now.mass[self.at] += self.additional
+
+
+class MisreadScale(HeavierLoad):
+    """A scale that shows a share too much or too little, of every load."""
+
+    @staticmethod
+    def suited(size, experiments):
+        return size
+
+    def begin(self, now):
+        now.mass[self.at] *= 1 + self.share
 
 
 class WarmUp(Form):
@@ -496,7 +509,7 @@ KNOWN = {
     "force_gain": [ForceGain],
     "end_effects": [EndEffects],
     "series_elasticity": [StretchyCable],
-    "payload_mass": [HeavierLoad],
+    "payload_mass": [HeavierLoad, MisreadScale],
     "valve_lag": [SecondPole, SlowerWhenFull],
     "valve_resonance": [Ringing],
     "valve_dead_time": [DeadTime],

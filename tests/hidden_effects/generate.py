@@ -21,12 +21,14 @@ from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from effects import KNOWN
+from far import FAR
 from pairs import NEEDS_COLUMN_IN_PAIR, PAIRS
 from plant import STEP, VALVE_GAIN, Experiment, Specimen, holding_pressure, simulate
 from textbook import SAME_FORM, true_parameters
 from unknown import UNKNOWN
 
 FORMS = {**KNOWN, **UNKNOWN}
+NEAR_OR_FAR = {**dict.fromkeys(sum(KNOWN.values(), []), "near"), **dict.fromkeys(sum(FAR.values(), []), "far")}
 DRIVEN_SHARE = 0.25
 TOLERANCE = 0.03  # of the preset's coefficients, that of the tool by default
 MOST_DRAWS = 20
@@ -211,10 +213,13 @@ def draw_mass(random, effects):
 
 
 def draw_hidden(random, effects, severity, same_form):
-    """Pairs of form and size."""
+    """Pairs of form and size. Near forms and far ones are equally likely, however many there are."""
     hidden = []
     for effect in effects:
-        forms = SAME_FORM[effect][:1] if same_form else FORMS[effect]
+        if same_form:
+            forms = SAME_FORM[effect][:1]
+        else:
+            forms = FAR[effect] if effect in FAR and random.random() < 0.5 else FORMS[effect]
         form = forms[random.integers(len(forms))]
         hidden.append((form, form.sizes(random, severity)))
     return hidden
@@ -405,6 +410,7 @@ def write_case(random, name, case, runs, out):
         "effects": case.effects,
         "severity": case.severity,
         "forms": [form.__name__ for form, _ in case.hidden],
+        "near_or_far": ["same" if case.same_form else NEAR_OR_FAR.get(form) for form, _ in case.hidden],
         "sizes": [{key: plain(value) for key, value in size.items()} for _, size in case.hidden],
         "visibility": case.visibility,
         "same_form": case.same_form,

@@ -35,6 +35,12 @@ class Outcome:
         return self.detail["effect"]
 
     @property
+    def near_or_far(self):
+        """What the form of a single effect is to the families of the tool; None for everything else."""
+        kinds = self.detail.get("near_or_far", [])
+        return kinds[0] if len(kinds) == 1 else None
+
+    @property
     def verdict(self):
         return self.said["verdict"]
 

@@ -80,13 +80,21 @@ class Score:
         visible = [o for o in self.single if (o.detail["visibility"] or 0) > VISIBLE]
         return [
             *share(NAMED, self.single, lambda o: o.named),
+            *self.of_forms(),
             *share("one effect: named exactly", self.single, lambda o: o.named_exactly),
             *share("one effect that shows: named, or in a set of two", visible, lambda o: o.named),
             *share("one effect: first cause right", self.single, lambda o: o.first_right),
-            *share("one effect: first cause wrong", self.single, lambda o: o.causes and not o.first_right),
+            *share("one effect: first cause wrong", self.single, is_wrong),
             *share("one effect: called nominal", self.single, lambda o: o.verdict == "nominal"),
             *([Measure("one effect: macro-F1", f"{self.macro_f1():.3f}")] if self.single else []),
         ]
+
+    def of_forms(self):
+        """Forms that a family of the tool holds, apart from those that none holds."""
+        groups = {kind: [o for o in self.single if o.near_or_far == kind] for kind in ("near", "far")}
+        lines = [share(f"… in a {kind} form", group, lambda o: o.named) for kind, group in groups.items()]
+        wrong = [share(f"… in a {kind} form: first cause wrong", group, is_wrong) for kind, group in groups.items()]
+        return sum(lines + wrong, [])
 
     def of_sound(self):
         return [
@@ -172,6 +180,10 @@ class Score:
         return rows
 
 
+def is_wrong(o):
+    return o.causes and not o.first_right
+
+
 def names_a_stranger(o):
     return any(not set(cause) & set(o.truths) for cause in o.causes)
 
@@ -203,7 +215,7 @@ def print_failures(score):
         if not score.is_right(o):
             recordings = [(r["load_mass"], r["excitation"], *r["columns"]) for r in o.detail["recordings"]]
             shows = "" if o.detail["visibility"] is None else f" visibility {o.detail['visibility']:.1f},"
-            hidden = f"{o.truth}/{'+'.join(o.detail['forms'])}"
+            hidden = f"{o.truth}/{'+'.join(o.detail['forms'])}" + (f" ({o.near_or_far})" if o.near_or_far else "")
             print(f"  {o.name} {hidden} -> {o.answer} ({o.verdict}),{shows} {recordings}")
 
 

@@ -1,0 +1,105 @@
+//! A replay of what a simulated experiment recorded gives back what the experiment did, whatever effect was in it.
+
+use sinew::effects::{Description, Effects};
+use sinew::measurement::{Recording, Signal};
+use sinew::model::Simulator;
+use sinew::parameters::Parameters;
+use sinew::plant::{ActuatorInputs, PneumaticActuator, PneumaticMuscle, steady_pressure};
+use sinew::simulation::replay;
+use std::fmt::Write;
+use std::path::Path;
+
+const STEP: f64 = 5e-3;
+const SAMPLES: usize = 1600;
+
+/// An effect in one of its forms with all its refinements.
+fn with_effect(effect: &Description, form: usize) -> Parameters {
+    let mut parameters = Parameters::default();
+    for (name, starts) in effect.forms[form].iter().chain(effect.refinements) {
+        parameters.set(name, starts[0]).unwrap();
+    }
+    parameters
+}
+
+fn command(k: usize) -> f64 {
+    1.6 + 0.6 * (1.9 * STEP * k as f64).sin()
+}
+
+fn parse(text: &str) -> Recording {
+    Recording::parse(text.as_bytes(), Path::new("simulated.csv"), &[]).unwrap()
+}
+
+/// Largest difference of a signal from what a replay gives, but for the end, where a delay has nothing to show yet.
+fn difference(parameters: &Parameters, recording: &Recording, signal: Signal) -> f64 {
+    let replayed = replay(parameters, recording).unwrap();
+    let (simulated, measured) = (replayed.get(signal).unwrap(), recording.get(signal).unwrap());
+    let pairs = measured.iter().zip(simulated).take(SAMPLES - 20);
+    pairs.fold(0.0, |largest, (one, other)| (one - other).abs().max(largest))
+}
+
+/// Every effect, in every form.
+fn cases() -> impl Iterator<Item = (&'static Description, Parameters)> {
+    Effects::DESCRIPTIONS
+        .iter()
+        .flat_map(|effect| (0..effect.forms.len()).map(move |form| (effect, with_effect(effect, form))))
+}
+
+#[test]
+fn a_hanging_load_is_replayed() {
+    for (effect, mut parameters) in cases() {
+        let mut text = "time [s],command [V],gauge_pressure [Pa],contraction [m],force [N],load_mass [kg]\n".to_owned();
+        parameters.initial.gauge_pressure = steady_pressure(&parameters, command(0), 0.05);
+        let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
+        muscle.inputs.command = command(0);
+        muscle.initialize(0.0).unwrap();
+        for k in 0..SAMPLES {
+            let (time, out) = (STEP * k as f64, muscle.outputs());
+            let (p, x, force) = (out.measured_gauge_pressure, out.measured_contraction, out.measured_force);
+            writeln!(text, "{time},{},{p},{x},{force},20", command(k)).unwrap();
+            muscle.inputs.command = command(k);
+            muscle.slopes.command = (command(k + 1) - command(k)) / STEP;
+            muscle.advance(STEP).unwrap();
+        }
+        // The mean of the first pressures is not quite the first.
+        let recording = parse(&text);
+        for (signal, close) in [(Signal::GaugePressure, 300.0), (Signal::Contraction, 4e-4), (Signal::Force, 1.0)] {
+            let difference = difference(&parameters, &recording, signal);
+            assert!(difference < close, "{} {signal:?} {difference}", effect.name);
+        }
+    }
+}
+
+#[test]
+fn a_prescribed_motion_is_replayed() {
+    let motion = |time: f64| (0.09 + 0.04 * (2.3 * time).sin(), 0.092 * (2.3 * time).cos());
+    for (effect, mut parameters) in cases().filter(|(effect, _)| !effect.of_load) {
+        let header = "gauge_pressure [Pa],contraction [m],force [N]\n";
+        let (mut with_command, mut without) = (format!("time [s],command [V],{header}"), format!("time [s],{header}"));
+        parameters.initial.gauge_pressure = steady_pressure(&parameters, command(0), 0.09);
+        let mut muscle = Simulator::<PneumaticActuator>::new(parameters);
+        let inputs = |k: usize| {
+            let (contraction, contraction_velocity) = motion(STEP * k as f64);
+            ActuatorInputs { command: command(k), contraction, contraction_velocity }
+        };
+        muscle.inputs = inputs(0);
+        muscle.initialize(0.0).unwrap();
+        for k in 0..SAMPLES {
+            muscle.inputs = inputs(k);
+            let (time, out) = (STEP * k as f64, muscle.outputs());
+            let row = format!("{},{},{}", out.measured_gauge_pressure, out.measured_contraction, out.measured_force);
+            writeln!(with_command, "{time},{},{row}", command(k)).unwrap();
+            writeln!(without, "{time},{row}").unwrap();
+            let (now, next) = (inputs(k), inputs(k + 1));
+            muscle.slopes = ActuatorInputs {
+                command: (next.command - now.command) / STEP,
+                contraction: (next.contraction - now.contraction) / STEP,
+                contraction_velocity: (next.contraction_velocity - now.contraction_velocity) / STEP,
+            };
+            muscle.advance(STEP).unwrap();
+        }
+        for (text, close) in [(with_command, 1.5), (without, 0.6)] {
+            let difference = difference(&parameters, &parse(&text), Signal::Force);
+            assert!(difference < close, "{} {difference} N", effect.name);
+        }
+    }
+}
