@@ -288,6 +288,7 @@ mod tests {
             sentence: "The load is 2 kg heavier.".to_owned(),
             parameters: Vec::new(),
             alternatives: vec!["valve_lag"],
+            rivals: Vec::new(),
             experiment: "a second load",
         };
         let page = page_of(&everything(Verdict::Ambiguous, vec![cause]));
