@@ -131,7 +131,7 @@ fn a_nominal_model_without_damping_is_no_trouble() {
 fn an_unknown_cause_gets_a_correction_and_no_name() {
     // A rubber stop inside the muscle: from 95 mm of contraction on it pushes back with 40 N/mm.
     let stopped = spoilt_force("prescribed_motion.csv", |contraction| -40.0 * (contraction - 95.0).max(0.0));
-    let found = diagnosis_of(&[stopped.clone()]);
+    let found = diagnosis_of(std::slice::from_ref(&stopped));
     assert_eq!((found.verdict, causes(&found)), (Verdict::Unexplained, vec![]));
     let correction = found.correction.as_ref().unwrap();
     assert!(correction.improvement > 0.6, "{correction:?}");
