@@ -338,9 +338,11 @@ fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
 /// A plan in a table or two.
 fn planned(found: &Plan) -> String {
     let mut text = format!("To tell apart: {}.\n{}\n\n", found.why, found.sentence());
-    let header = ["experiment", "seconds", "pairs told apart", "smallest lambda"].map(str::to_owned);
+    let header = ["experiment", "seconds", "pairs told apart", "smallest lambda", ""].map(str::to_owned);
     let row = |row: &plan::Compared| {
-        [row.name.clone(), format!("{:.0}", row.duration), row.told_apart.to_string(), format!("{:.3e}", row.lambda)]
+        let (seconds, lambda) = (format!("{:.0}", row.duration), format!("{:.3e}", row.lambda));
+        let how = if row.fitted { "fitted" } else { "to first order" };
+        [row.name.clone(), seconds, row.told_apart.to_string(), lambda, how.to_owned()]
     };
     let rows = std::iter::once(header).chain(found.compared.iter().map(row));
     text += &table(rows.map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect()).text;

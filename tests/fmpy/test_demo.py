@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -103,6 +104,26 @@ def test_tool_and_fmu_simulate_alike(folder, muscle, mass):
             simulated = follow(instance, recording["time"], recording["command"], names)
         assert simulated.shape == shown.shape
         assert (np.abs(simulated - shown).max(axis=0) <= 1e-6 * np.abs(shown).max(axis=0)).all()
+
+
+def test_replay_through_the_extended_fmu_gives_the_reported_error(folder):
+    """On the samples that no fit saw, which the answer names."""
+    diagnosis = json.loads((folder / "diagnosis.json").read_text())
+    squares = {name: [] for name in OUTPUTS}
+    for part in diagnosis["held_out"].split(", "):
+        name, start = re.fullmatch(r"(.*) from (.*) s", part).groups()
+        recording = read_csv(ROOT / "data" / name)
+        shown = columns_of(folder / "simulated.csv", name, "extended")
+        with Instance(Fmu(folder / "PneumaticMuscle.fmu"),
+                      {"load.mass": recording["load_mass"][0], "initial.gauge_pressure": shown[0, 0]}) as instance:
+            names = [f"measured.{output}" for output in OUTPUTS]
+            simulated = follow(instance, recording["time"], recording["command"], names)
+        unseen = recording["time"] >= float(start)
+        for k, (output, unit) in enumerate(zip(OUTPUTS, (1e5, 1e-3, 1.0), strict=True)):  # recorded in bar, mm, N
+            squares[output].append(((unit * recording[output] - simulated[:, k]) ** 2)[unseen])
+    for output in OUTPUTS:
+        error = np.sqrt(np.nanmean(np.concatenate(squares[output])))
+        assert error == pytest.approx(diagnosis["signals"][output]["extended_rms"], rel=0.01), output
 
 
 def columns_of(path, recording, model):

@@ -52,7 +52,7 @@ pub fn to_json(plan: &Plan) -> Value {
     });
     let pairs = |pair: &Pair| json!({ "effects": pair.effects, "lambda": pair.lambda });
     let compared = plan.compared.iter().map(|row| {
-        json!({ "experiment": row.name, "duration": row.duration, "lambda": row.lambda, "told_apart": row.told_apart })
+        json!({ "experiment": row.name, "duration": row.duration, "lambda": row.lambda, "told_apart": row.told_apart, "fitted": row.fitted })
     });
     json!({
         "sentence": plan.sentence(),

@@ -132,6 +132,8 @@ pub struct Compared {
     pub lambda: f64,
     /// Pairs whose λ is enough.
     pub told_apart: usize,
+    /// Whether λ comes from fits; else it is to first order.
+    pub fitted: bool,
 }
 
 /// One recording that is to be made.
@@ -343,18 +345,22 @@ impl Choice {
             experiment,
             duration: experiment.runs.iter().map(|run| bank.runs[*run].duration()).sum(),
             lambda: bank.screened(&experiment.runs, &sensors),
+            fitted: false,
         });
         let mut screened: Vec<Screened> = screened.collect();
         screened.sort_by(order);
         screened.truncate(REPORTED);
-        // Only what promises something is worth the fits.
-        let promising = screened.first().is_some_and(|best| told_apart(&best.lambda) > 0);
-        if promising && task.rivals.len() <= FEW_RIVALS {
-            screened.truncate(FITTED);
-            for promising in &mut screened {
+        // Only what promises something is worth the fits, and the second only where the first falls short.
+        let promised = screened.first().map_or(0, |best| told_apart(&best.lambda));
+        if promised > 0 && task.rivals.len() <= FEW_RIVALS {
+            for promising in screened.iter_mut().take(FITTED) {
                 promising.lambda = bank.fitted(&promising.experiment.runs, &sensors);
+                promising.fitted = true;
+                if told_apart(&promising.lambda) >= promised {
+                    break;
+                }
             }
-            screened.sort_by(order);
+            screened.sort_by(|a, b| b.fitted.cmp(&a.fitted).then(order(a, b)));
         }
         let rows = screened.iter().map(|screened| screened.row(bank)).collect();
         let Screened { experiment, lambda, .. } = screened.into_iter().next()?;
@@ -408,6 +414,7 @@ struct Screened<'a> {
     /// s.
     duration: f64,
     lambda: DMatrix<f64>,
+    fitted: bool,
 }
 
 impl Screened<'_> {
@@ -418,6 +425,7 @@ impl Screened<'_> {
             duration: self.duration,
             lambda: smallest(&self.lambda),
             told_apart: told_apart(&self.lambda),
+            fitted: self.fitted,
         }
     }
 }
