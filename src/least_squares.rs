@@ -234,25 +234,36 @@ pub fn linear_decrease(residuals: &[f64], columns: &[Vec<f64>], free: &[Free]) -
     -2.0 * linear - (&normal * &amounts).dot(&amounts)
 }
 
+/// The damped step of Gauss and Newton within the bounds: a parameter that would leave them stops there, and the others
+/// are solved for anew.
 fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, free: &[Free], parameters: &[f64], damping: f64) -> Vec<f64> {
     let pushes_out = |k: usize| {
         (parameters[k] <= free[k].lower && gradient[k] > 0.0) || (parameters[k] >= free[k].upper && gradient[k] < 0.0)
     };
-    let moving: Vec<usize> = (0..free.len()).filter(|&k| !pushes_out(k)).collect();
-    let matrix = DMatrix::from_fn(moving.len(), moving.len(), |i, j| {
-        let entry = normal[(moving[i], moving[j])];
-        // The small constant keeps a parameter that nothing depends on where it is.
-        if i == j { entry * (1.0 + damping) + 1e-9 } else { entry }
-    });
-    let right = DVector::from_fn(moving.len(), |i, _| -gradient[moving[i]]);
-    let solution = matrix.cholesky().map(|factor| factor.solve(&right));
+    let mut moving: Vec<usize> = (0..free.len()).filter(|&k| !pushes_out(k)).collect();
     let mut trial = parameters.to_vec();
-    if let Some(solution) = solution {
+    loop {
+        let stopped = DVector::from_fn(free.len(), |k, _| {
+            if moving.contains(&k) { 0.0 } else { (trial[k] - parameters[k]) / free[k].typical }
+        });
+        let pull = gradient + normal * stopped;
+        let matrix = DMatrix::from_fn(moving.len(), moving.len(), |i, j| {
+            let entry = normal[(moving[i], moving[j])];
+            // The small constant keeps a parameter that nothing depends on where it is.
+            if i == j { entry * (1.0 + damping) + 1e-9 } else { entry }
+        });
+        let right = DVector::from_fn(moving.len(), |i, _| -pull[moving[i]]);
+        let Some(solution) = matrix.cholesky().map(|factor| factor.solve(&right)) else { return parameters.to_vec() };
         for (&k, change) in moving.iter().zip(solution.iter()) {
-            trial[k] = (trial[k] + change * free[k].typical).clamp(free[k].lower, free[k].upper);
+            trial[k] = parameters[k] + change * free[k].typical;
+        }
+        let before = moving.len();
+        moving.retain(|&k| (free[k].lower..=free[k].upper).contains(&trial[k]));
+        trial.iter_mut().zip(free).for_each(|(value, free)| *value = value.clamp(free.lower, free.upper));
+        if moving.len() == before {
+            return trial;
         }
     }
-    trial
 }
 
 #[cfg(test)]

@@ -74,8 +74,9 @@ fn a_shifted_position_sensor_is_found_in_hanging_and_prescribed_motion() {
         });
         let found = diagnosis_of(&[shifted]);
         assert_eq!(causes(&found), ["contraction_sensor_offset"], "{name}");
-        let offset = found.extended.get("contraction_sensor_offset.offset").unwrap();
-        assert!((offset - 0.02).abs() < 1e-3, "{name}: {offset}");
+        // With one load a shift is in part what an area within the tolerance does, too.
+        let offset = &found.causes[0].parameters[0];
+        assert!((offset.value - 0.02).abs() < 2.5e-3, "{name}: {offset:?}");
     }
 }
 

@@ -18,6 +18,10 @@ const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
 /// Of a fit whose parameters count.
 const EXACT: Effort = Effort { iterations: 20, small_decrease: 1e-5 };
 
+/// Rounds of a fit that counts, and the relative gain of one below which it is the last.
+const MOST_ROUNDS: usize = 6;
+const SMALL_GAIN: f64 = 1e-3;
+
 /// A parameter as fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedParameter {
@@ -220,12 +224,31 @@ impl<'a> Bench<'a> {
         self.fit(hypothesis, start, Scope::All, &self.slopes, ROUGH)
     }
 
-    /// Fits a hypothesis to the end on the samples in scope, starting from a model that is about right.
+    /// Fits a hypothesis to the end on the samples in scope, starting from a model that is about right. What the
+    /// corrections do is looked at anew until that helps no more.
     ///
     /// `None` where the start cannot be simulated.
     pub fn exact_fit(&self, hypothesis: &Hypothesis, start: &Parameters, scope: Scope) -> Option<Fitted> {
-        let slopes = self.slopes_at(start, &self.data.residuals(start)?);
-        self.fit(hypothesis, start, scope, &slopes, EXACT)
+        let mut best: Option<(Fitted, f64)> = None;
+        for _ in 0..MOST_ROUNDS {
+            let from = best.as_ref().map_or(*start, |(fitted, _)| fitted.parameters);
+            let slopes = self.slopes_at(&from, &self.data.residuals(&from)?);
+            let fitted = self.fit(hypothesis, &from, scope, &slopes, EXACT)?;
+            let cost = self.cost(&fitted, scope);
+            let before = best.as_ref().map_or(f64::INFINITY, |(_, cost)| *cost);
+            if cost < before {
+                best = Some((fitted, cost));
+            }
+            if cost > (1.0 - SMALL_GAIN) * before {
+                break;
+            }
+        }
+        best.map(|(fitted, _)| fitted)
+    }
+
+    /// Sum of weighted squares.
+    fn cost(&self, fitted: &Fitted, scope: Scope) -> f64 {
+        weighted(&fitted.residuals, &self.data.weights(scope)).iter().map(|r| r * r).sum()
     }
 
     fn fit(

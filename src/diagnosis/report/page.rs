@@ -268,7 +268,6 @@ mod tests {
             ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2, parameters: Vec::new() }],
             extended: Parameters::default(),
             corrections: vec![correction],
-            correction: None,
             notes: vec!["<b>bold</b>".to_owned()],
             remaining: vec![Remaining { signal: Signal::Force, on: "speed & pressure".to_owned(), share: 0.43 }],
         }
@@ -291,7 +290,6 @@ mod tests {
             sentence: "The load is 2 kg heavier.".to_owned(),
             parameters: Vec::new(),
             alternatives: vec!["valve_lag"],
-            rivals: Vec::new(),
             experiment: "a second load",
         };
         let page = page_of(&everything(Verdict::Ambiguous, vec![cause]));
