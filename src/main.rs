@@ -126,10 +126,10 @@ impl PlanArguments {
     fn task(&self, nominal: &Parameters) -> Result<Task> {
         let usual = Path::new("sinew-diagnosis/diagnosis.json");
         let there = || (self.effects.is_empty() && usual.is_file()).then_some(usual);
-        if let Some(path) = self.diagnosis.as_deref().or_else(there) {
-            if let Some(task) = Task::of_diagnosis(path, nominal)? {
-                return Ok(task);
-            }
+        if let Some(path) = self.diagnosis.as_deref().or_else(there)
+            && let Some(task) = Task::of_diagnosis(path, nominal)?
+        {
+            return Ok(task);
         }
         let names: &[String] = if self.effects == ["all"] { &[] } else { &self.effects };
         Task::of_effects(names, &self.sensors, nominal)

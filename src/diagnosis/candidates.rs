@@ -33,6 +33,17 @@ pub struct FittedParameter {
     pub unit: &'static str,
 }
 
+/// Which refinements of an effect are free.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refined {
+    /// None.
+    Not,
+    /// The one at this position.
+    By(usize),
+    /// All.
+    Fully,
+}
+
 /// An effect at work in one of its forms.
 #[derive(Debug, Clone, Copy)]
 pub struct Part {
@@ -40,15 +51,19 @@ pub struct Part {
     pub effect: &'static Description,
     /// Which of its forms.
     pub form: usize,
-    /// Whether its refinements are free as well.
-    pub refined: bool,
+    /// Which of its refinements are free as well.
+    pub refined: Refined,
 }
 
 impl Part {
     /// The free parameters; a refinement that the form has already is not counted twice.
     pub fn freed(self) -> impl Iterator<Item = &'static Freed> {
         let form = self.effect.forms[self.form];
-        let refinements: &'static [Freed] = if self.refined { self.effect.refinements } else { &[] };
+        let refinements = match self.refined {
+            Refined::Not => &[],
+            Refined::By(which) => &self.effect.refinements[which..=which],
+            Refined::Fully => self.effect.refinements,
+        };
         form.iter().chain(refinements.iter().filter(|(name, _)| form.iter().all(|(known, _)| known != name)))
     }
 }
@@ -258,7 +273,7 @@ impl<'a> Bench<'a> {
     /// change that the effect makes is scaled and the corrections and the parameters so far adapt, to first order.
     pub fn starts(&self, base: &Fitted, effect: &'static Description) -> Vec<Start> {
         let forms = (0..effect.forms.len()).flat_map(|form| {
-            let part = Part { effect, form, refined: false };
+            let part = Part { effect, form, refined: Refined::Not };
             let most = part.freed().map(|(_, starts)| starts.len()).max().unwrap_or(0);
             (0..most).map(move |choice| (part, choice))
         });

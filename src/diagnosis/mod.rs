@@ -117,12 +117,12 @@ pub struct Diagnosis {
     pub extended: Parameters,
     /// Corrections of the nominal model that were fitted along.
     pub corrections: Vec<FittedParameter>,
-    /// Where the cause is unknown: a smooth correction without one, which explains nothing. No part of `extended`.
-    pub correction: Option<Correction>,
     /// What a person should know about the input.
     pub notes: Vec<String>,
     /// What the error that is left goes with.
     pub remaining: Vec<Remaining>,
+    /// Where the cause is unknown: a smooth correction without one, which explains nothing. No part of `extended`.
+    pub correction: Option<Correction>,
 }
 
 /// Diagnoses recordings against a nominal model.

@@ -36,7 +36,8 @@ struct Variable {
 ///
 /// The share is that of the mean square which bin means of the training samples take off the held-out ones.
 pub fn remaining(data: &Data, model: &Parameters, residuals: &[f64]) -> Vec<Remaining> {
-    let replays: Vec<Option<Replay>> = data.recordings().iter().map(|recording| replay(model, recording).ok()).collect();
+    let replays: Vec<Option<Replay>> =
+        data.recordings().iter().map(|recording| replay(model, recording).ok()).collect();
     let mut all: Vec<Remaining> =
         data.signals().into_iter().filter_map(|signal| most_telling(data, signal, residuals, &replays)).collect();
     all.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -61,13 +62,21 @@ fn most_telling(data: &Data, signal: Signal, residuals: &[f64], replays: &[Optio
 }
 
 /// The quantities at the samples: measured where they were, else simulated.
-fn variables(recordings: &[Recording], replays: &[Option<Replay>], samples: &[(usize, usize, f64, bool)]) -> Vec<Variable> {
+fn variables(
+    recordings: &[Recording],
+    replays: &[Option<Replay>],
+    samples: &[(usize, usize, f64, bool)],
+) -> Vec<Variable> {
     let signal = |signal: Signal| -> Vec<Option<Vec<f64>>> {
         let simulated = |k: usize| replays[k].as_ref().and_then(|replay| replay.get(signal)).map(<[f64]>::to_vec);
         (0..recordings.len()).map(|k| recordings[k].bridged(signal).or_else(|| simulated(k))).collect()
     };
     let rates = |columns: &[Option<Vec<f64>>]| -> Vec<Option<Vec<f64>>> {
-        columns.iter().zip(recordings).map(|(column, r)| column.as_ref().map(|c| crate::simulation::slopes(&r.time, c))).collect()
+        columns
+            .iter()
+            .zip(recordings)
+            .map(|(column, r)| column.as_ref().map(|c| crate::simulation::slopes(&r.time, c)))
+            .collect()
     };
     let (pressure, contraction) = (signal(Signal::GaugePressure), signal(Signal::Contraction));
     let velocity = rates(&contraction);

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Share of each recording, from its start, that fits see when its end is held out.
+/// Share of each recording, from its start, that fits see; the rest is held out.
 const TRAINING_SHARE: f64 = 0.6;
 /// Fewest samples of a recording from which anything can be concluded.
 const FEWEST_SAMPLES: usize = 50;
@@ -18,6 +18,8 @@ const LONGEST_CORRELATION: f64 = 3.0;
 /// Structural error of a nominal muscle beyond its coefficients, as a share of the declared tolerance and of the span of
 /// the signal: a polynomial is never quite the muscle.
 const STRUCTURE_SHARE: f64 = 0.05;
+/// Length of a block in s: errors of different blocks count as independent.
+const BLOCK: f64 = 2.0;
 /// No sensor is better than this share of what it shows: data without any noise are simulated.
 const FINEST: f64 = 1e-5;
 
@@ -79,18 +81,14 @@ impl<'a> Data<'a> {
         }
         let mut data = Self {
             recordings,
-            held_out_from: last_recording(recordings),
+            held_out_from: last_part(recordings),
             segments: segments(recordings, nominal)?,
             noise: BTreeMap::new(),
             tolerance,
         };
-        // The last of several recordings is held out, if all signals can be both fitted and judged then.
-        if recordings.len() == 1 || !data.signals().into_iter().all(|signal| data.is_judged(signal)) {
-            data.held_out_from = last_part(recordings);
-            let judged: Vec<Signal> = data.signals().into_iter().filter(|signal| data.is_judged(*signal)).collect();
-            data.segments.retain(|segment| judged.contains(&segment.signal));
-            number(&mut data.segments);
-        }
+        let judged: Vec<Signal> = data.signals().into_iter().filter(|signal| data.is_judged(*signal)).collect();
+        data.segments.retain(|segment| judged.contains(&segment.signal));
+        number(&mut data.segments);
         if data.segments.is_empty() {
             return Err(Error::Recording {
                 path: recordings[0].path.clone(),
@@ -175,11 +173,8 @@ impl<'a> Data<'a> {
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
     /// simulated.
     pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
-        COUNT.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        let t0 = std::time::Instant::now();
         let replays: Vec<_> =
             self.recordings.par_iter().map(|recording| replay(parameters, recording).ok()).collect::<Option<_>>()?;
-        TIME.fetch_add(t0.elapsed().as_micros() as usize, std::sync::atomic::Ordering::Relaxed);
         let mut all = Vec::with_capacity(self.segments.last().map_or(0, |segment| segment.range.end));
         for segment in &self.segments {
             let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);
@@ -205,12 +200,6 @@ impl<'a> Data<'a> {
 
     /// How large residuals are, per signal and recording.
     pub fn losses(&self, residuals: &[f64], scope: Scope) -> Vec<Loss> {
-        let t0 = std::time::Instant::now();
-        let out = self.losses0(residuals, scope);
-        TIME2.fetch_add(t0.elapsed().as_micros() as usize, std::sync::atomic::Ordering::Relaxed);
-        out
-    }
-    fn losses0(&self, residuals: &[f64], scope: Scope) -> Vec<Loss> {
         let in_scope = self.segments.iter().map(|segment| {
             let level = self.noise[&segment.signal].level;
             let both = segment.samples.iter().zip(&residuals[segment.range.clone()]);
@@ -350,13 +339,7 @@ fn number(segments: &mut [Segment]) {
     }
 }
 
-/// Times from which recordings are held out when it is the last one, whole.
-fn last_recording(recordings: &[Recording]) -> Vec<f64> {
-    let last = recordings.len() - 1;
-    (0..=last).map(|index| if index == last { f64::NEG_INFINITY } else { f64::INFINITY }).collect()
-}
-
-/// Times from which recordings are held out when it is the end of each.
+/// Times from which recordings are held out: the end of each, so that every load and every regime is seen by the fits.
 fn last_part(recordings: &[Recording]) -> Vec<f64> {
     let from = |time: &Vec<f64>| time[0] + TRAINING_SHARE * (time[time.len() - 1] - time[0]);
     recordings.iter().map(|recording| from(&recording.time)).collect()
@@ -373,7 +356,7 @@ fn span(values: &[f64]) -> f64 {
 }
 
 /// Number of samples divided by 1 + 2 Σ ρ, the sum of the autocorrelations up to the first that is negative
-/// (initial positive sequence, C. Geyer 1992, doi 10.1214/ss/1177011137).
+/// (initial positive sequence, C. Geyer 1992, doi 10.1214/ss/1177011137); at least one per block of two seconds.
 fn effective_samples(series: &[f64], period: f64) -> f64 {
     let power: f64 = series.iter().map(|r| r * r).sum();
     if power <= 0.0 {
@@ -383,7 +366,8 @@ fn effective_samples(series: &[f64], period: f64) -> f64 {
     let longest = ((LONGEST_CORRELATION / period) as usize).min(series.len() / 4);
     let correlation = |lag: usize| series.iter().zip(&series[lag..]).map(|(a, b)| a * b).sum::<f64>() / power;
     let sum: f64 = (1..=longest).map(correlation).take_while(|rho| *rho > 0.0).sum();
-    series.len() as f64 / (1.0 + 2.0 * sum)
+    let samples = series.len() as f64;
+    (samples / (1.0 + 2.0 * sum)).max(samples * period / BLOCK)
 }
 
 #[cfg(test)]
@@ -399,8 +383,3 @@ mod tests {
         assert!((30.0..200.0).contains(&worth), "{worth}");
     }
 }
-
-pub static COUNT: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
-pub static TIME: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
-pub static TIME2: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
-pub fn count(what: &str) { if std::env::var("SINEW_TRACE").is_ok() { eprintln!("@{what} {} sim {} ms loss {} ms", COUNT.load(std::sync::atomic::Ordering::Relaxed), TIME.load(std::sync::atomic::Ordering::Relaxed)/1000, TIME2.load(std::sync::atomic::Ordering::Relaxed)/1000); } }

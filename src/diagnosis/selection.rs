@@ -1,7 +1,7 @@
 //! Which causes are named, if any: forward selection over a beam of hypotheses, with refusal in both directions.
 
 use super::Verdict;
-use super::candidates::{Bench, Fitted, Part, Start, neutralised};
+use super::candidates::{Bench, Fitted, Part, Refined, Start, neutralised};
 use super::residuals::{Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
@@ -14,9 +14,9 @@ const LEAST_EVIDENCE: f64 = 10.0;
 const RIVAL: f64 = 3.0;
 /// Share of the error beyond noise that the named causes together must explain: of all samples, and of those that the fit
 /// did not see.
-const LEAST_EXPLAINED: (f64, f64) = (0.9, 0.8);
+const LEAST_EXPLAINED: (f64, f64) = (0.9, 0.7);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
-const LEAST_FURTHER: f64 = 0.9;
+const LEAST_FURTHER: f64 = 0.8;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
 /// Share of a signal's error that a named effect may leave without a further effect being looked for: a seventh of its
@@ -24,7 +24,7 @@ const NEGLIGIBLE: f64 = 0.25;
 const LEFT_BY_FORM: f64 = 0.02;
 /// How many times the structural error of a sound model an error must be to be called unexplained.
 const UNEXPLAINED: f64 = 4.0;
-/// Hypotheses that are carried on at each number of effects.
+/// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
 const BEAM: usize = 3;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
@@ -121,43 +121,12 @@ impl<'a, 'b> Search<'a, 'b> {
             self.bench.refine_noise(&residuals);
             singles = self.judged_anew(singles);
         }
-        super::residuals::count("singles");
         let mut levels = vec![self.refined_best(singles)];
-        super::residuals::count("refined");
         while levels.len() < MOST_EFFECTS && self.something_is_left(levels.last()?) {
             let next = self.next_level(levels.last()?, &starts);
             levels.push(next);
-            super::residuals::count("next");
         }
-        super::residuals::count("levels");
-        self.trace(&levels);
         self.choose(levels)
-    }
-
-    fn trace(&self, levels: &[Vec<Judged>]) {
-        if std::env::var("SINEW_TRACE").is_ok() {
-            let show = |l: &[Loss]| {
-                beyond_noise(l).iter().map(|(s, v)| format!("{}:{v:.2}", s.name())).collect::<Vec<_>>().join(" ")
-            };
-            eprintln!(
-                "baseline {} neff {:?}",
-                show(&self.baseline.losses),
-                self.baseline.losses.iter().map(|l| l.effective as i64).collect::<Vec<_>>()
-            );
-            for level in levels {
-                for j in level.iter().take(5) {
-                    eprintln!(
-                        "  {:?} ev {:.1} R {:.3} {} neff {:?} refined {:?}",
-                        j.fitted.hypothesis.names(),
-                        j.evidence,
-                        j.explained,
-                        show(&j.fitted.losses),
-                        j.fitted.losses.iter().map(|l| l.effective as i64).collect::<Vec<_>>(),
-                        j.fitted.hypothesis.parts.iter().map(|p| p.refined).collect::<Vec<_>>()
-                    );
-                }
-            }
-        }
     }
 
     /// Judges fits again after the noise became better known.
@@ -220,25 +189,26 @@ impl<'a, 'b> Search<'a, 'b> {
         self.bench.exact_fit(hypothesis, parameters, Scope::All).map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// The hypothesis with the refinements of its last effect free, where the data pay for them.
+    /// The hypothesis with refinements of its last effect free, one of them or all, where the data pay for them.
     fn refined(&self, judged: Judged) -> Judged {
+        let nothing_left = beyond_noise(&judged.fitted.losses).values().all(|left| *left <= NEGLIGIBLE);
+        let Some(last) = judged.fitted.hypothesis.parts.last().filter(|_| !nothing_left) else { return judged };
+        let each = (0..last.effect.refinements.len()).map(Refined::By);
+        let refined = each.chain([Refined::Fully]).collect::<Vec<_>>().into_par_iter();
+        let better = refined.filter_map(|refined| self.refined_by(&judged, refined));
+        better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
+    }
+
+    fn refined_by(&self, judged: &Judged, refined: Refined) -> Option<Judged> {
         let mut hypothesis = judged.fitted.hypothesis.clone();
-        let Some(last) = hypothesis.parts.last_mut().filter(|part| !part.effect.refinements.is_empty()) else {
-            return judged;
-        };
-        if beyond_noise(&judged.fitted.losses).values().all(|left| *left <= NEGLIGIBLE) {
-            return judged;
-        }
+        let last = hypothesis.parts.last_mut()?;
         let known: Vec<&str> = last.freed().map(|(name, _)| *name).collect();
-        last.refined = true;
+        last.refined = refined;
         let mut start = judged.fitted.parameters;
-        for (name, values) in last.effect.refinements.iter().filter(|(name, _)| !known.contains(name)) {
-            let _ = start.set(name, values[0]);
+        for (name, values) in last.freed().filter(|(name, _)| !known.contains(name)) {
+            start.set(name, values[0]).ok()?;
         }
-        match self.bench.rough_fit(&hypothesis, &start).map(|fitted| self.judge(fitted)) {
-            Some(better) if better.score > judged.score => better,
-            _ => judged,
-        }
+        Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
     }
 
     /// Whether the best of the hypotheses leaves an error that is worth a further effect.
@@ -255,7 +225,7 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
         let mut next: Vec<Judged> = Vec::new();
-        for base in level.iter().take(BEAM) {
+        for base in bases(level) {
             for judged in self.extend(&base.fitted, starts) {
                 let same = |known: &Judged| known.fitted.hypothesis.names() == judged.fitted.hypothesis.names();
                 match next.iter().position(same) {
@@ -276,7 +246,8 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The best hypothesis of all levels, without effects that it can spare.
     fn best(&self, levels: &[Vec<Judged>]) -> Option<Judged> {
-        let mut best = levels[0].first().filter(|best| best.evidence > LEAST_EVIDENCE)?;
+        let shows = |best: &&Judged| self.shows(&self.baseline.losses, &best.fitted.losses);
+        let mut best = levels[0].first().filter(|best| best.evidence > LEAST_EVIDENCE).filter(shows)?;
         for level in &levels[1..] {
             let Some(more) = level.first().filter(|more| self.is_worth(best, more)) else { break };
             best = more;
@@ -288,7 +259,17 @@ impl<'a, 'b> Search<'a, 'b> {
     fn is_worth(&self, fewer: &Judged, more: &Judged) -> bool {
         let left = total(&beyond_noise(&fewer.fitted.losses));
         let further = 1.0 - total(&beyond_noise(&more.fitted.losses)) / left.max(f64::MIN_POSITIVE);
-        evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE && further > LEAST_FURTHER
+        evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE
+            && further > LEAST_FURTHER
+            && self.shows(&fewer.fitted.losses, &more.fitted.losses)
+    }
+
+    /// Whether what an effect takes off the error of some signal is more than the structural error of a sound model:
+    /// less may be that.
+    fn shows(&self, without: &[Loss], with: &[Loss]) -> bool {
+        let (before, after) = (beyond_noise(without), beyond_noise(with));
+        let least = |signal| self.bench.data.structure(signal).max(NEGLIGIBLE);
+        before.into_iter().any(|(signal, beyond)| beyond - after[&signal] > least(signal))
     }
 
     /// Drops effects that a hypothesis of several can spare, the most superfluous first.
@@ -332,7 +313,6 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
-        super::residuals::count("chosen");
         Some(Chosen { verdict, model, alternatives, rivals, singles })
     }
 
@@ -351,6 +331,18 @@ impl<'a, 'b> Search<'a, 'b> {
         other.fitted.hypothesis.names() != best.fitted.hypothesis.names()
             && evidence(&other.fitted, &best.fitted) < RIVAL
     }
+}
+
+/// The hypotheses that are carried on: the best, and for each signal the one that leaves least of it, since of two effects
+/// each may be alone in its signal.
+fn bases(level: &[Judged]) -> Vec<&Judged> {
+    let left: Vec<BTreeMap<Signal, f64>> = level.iter().map(|judged| beyond_noise(&judged.fitted.losses)).collect();
+    let signals = left.first().into_iter().flat_map(|left| left.keys());
+    let best_for = |signal: &Signal| (0..level.len()).min_by(|a, b| left[*a][signal].total_cmp(&left[*b][signal]));
+    let mut chosen: Vec<usize> = (0..level.len().min(BEAM)).chain(signals.filter_map(best_for)).collect();
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen.into_iter().map(|k| &level[k]).collect()
 }
 
 /// Effects that stand in the place of one in rivals that agree in all others.

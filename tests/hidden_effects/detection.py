@@ -127,7 +127,9 @@ def draw(rows, file):
         place.set_visible(False)
     figure.supxlabel("size of the effect (1: full)")
     figure.supylabel("share of cases that are named")
-    axes.flat[0].legend(loc="lower right", frameon=False, fontsize=6)
+    for place in axes.flat[max(len(effects) - COLUMNS, 0) : len(effects)]:
+        place.tick_params(labelbottom=True)
+    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
     figure.savefig(file, metadata={"Date": None})
 
 

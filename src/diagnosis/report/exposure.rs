@@ -81,8 +81,12 @@ impl Residuals {
             let (before, after) = (mean_square(before), mean_square(&after[link]));
             before.zip(after).map_or(0.0, |(before, after)| (1.0 - after / before).max(0.0))
         };
+        let beyond_noise = |before: &[f64], link: usize| {
+            let noise = noise(diagnosis, self.links[link].0.output()).unwrap_or(0.0);
+            mean_square(before).map_or(0.0, |before| (1.0 - noise * noise / before).max(0.0))
+        };
         if diagnosis.causes.is_empty() {
-            return vec![self.clearest(0, &|_, _| 1.0)];
+            return vec![self.clearest(0, &beyond_noise)];
         }
         (0..diagnosis.causes.len()).map(|cause| self.clearest(self.before(cause), &removed)).collect()
     }
@@ -92,13 +96,13 @@ impl Residuals {
         if self.residuals.len() > 2 { 2 + cause } else { 0 }
     }
 
-    fn clearest(&self, model: usize, removed: &dyn Fn(&[f64], usize) -> f64) -> Option<Exposed> {
+    fn clearest(&self, model: usize, worth: &dyn Fn(&[f64], usize) -> f64) -> Option<Exposed> {
         let value = |variable: Variable| Some(self.values[self.position(variable)?].as_slice());
         let all = (0..self.links.len()).filter_map(|link| {
             let before = &self.residuals[model][link];
             let exposure = most_telling(self.links[link].0, before, value)?;
             let variable = self.position(exposure.variable)?;
-            Some((exposure.share * removed(before, link), Exposed { link, variable }))
+            Some((exposure.share * worth(before, link), Exposed { link, variable }))
         });
         let best = all.reduce(|best, next| if next.0 > best.0 + CLEARLY { next } else { best });
         best.filter(|(seen, _)| *seen > SEEN).map(|(_, exposed)| exposed)

@@ -108,11 +108,14 @@ pub fn files(
         let name = format!("{}.fmu", interface.name);
         files.insert(0, made(&name, "the extended model for any FMI 2.0 tool", fmu(interface, extended, libraries)));
     }
-    if let (Some(correction), Some(muscle)) = (&diagnosis.correction, models().into_iter().next()) {
-        let (interface, model) = (muscle.interface(), &correction.parameters);
-        let name = format!("{}-unknown-cause.fmu", interface.name);
-        files.push(made("unknown_cause.toml", "the model with a correction of unknown cause", model.to_toml().into()));
-        files.push(made(&name, "the FMU with a correction of unknown cause", fmu(interface, model, libraries)));
+    if let Some(correction) = &diagnosis.correction {
+        let purpose = "the nominal model with the correction without a cause, as parameters";
+        files.push(made("unknown_cause.toml", purpose, correction.parameters.to_toml().into()));
+        if let Some(muscle) = models().into_iter().next() {
+            let interface = muscle.interface();
+            let name = format!("{}-unknown-cause.fmu", interface.name);
+            files.push(made(&name, "the same for any FMI 2.0 tool", fmu(interface, &correction.parameters, libraries)));
+        }
     }
     let page = page::html(diagnosis, nominal, recordings, &files)?;
     files.push(made("report.html", "this page", page.into()));

@@ -47,7 +47,8 @@ pub fn html(diagnosis: &Diagnosis, nominal: &Parameters, recordings: &[Recording
         notes => notes(diagnosis, recordings),
         files => files.iter().map(|file| context! { name => file.name.clone(), purpose => file.purpose }).collect::<Vec<_>>(),
         causes => causes.map(|(cause, exposed)| cause_context(cause, *exposed, &residuals)).collect::<Vec<_>>(),
-        unknown => unknown.then(|| exposed[0].map(|exposed| exposed_context(exposed, &residuals))).flatten(),
+        unknown,
+        shows => exposed[0].filter(|_| unknown).map(|exposed| exposed_context(exposed, &residuals)),
         signals => diagnosis.signals.iter().map(errors_context).collect::<Vec<_>>(),
         recordings => of_recordings,
         variables => residuals.variables.iter().map(|variable| variable.label().0).collect::<Vec<_>>(),
@@ -258,6 +259,7 @@ mod tests {
     fn everything(verdict: Verdict, causes: Vec<Cause>) -> Diagnosis {
         let correction = FittedParameter { name: "muscle.area_scale", value: 1.01, low: 1.0, high: 1.02, unit: "1" };
         Diagnosis {
+            correction: None,
             verdict,
             causes,
             signals: vec![SignalErrors { signal: Signal::Force, nominal_rms: 20.0, extended_rms: 2.0, noise_rms: 1.0 }],
@@ -266,7 +268,6 @@ mod tests {
             ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2, parameters: Vec::new() }],
             extended: Parameters::default(),
             corrections: vec![correction],
-            correction: None,
             notes: vec!["<b>bold</b>".to_owned()],
             remaining: vec![Remaining { signal: Signal::Force, on: "speed & pressure".to_owned(), share: 0.43 }],
         }
@@ -284,11 +285,11 @@ mod tests {
     #[test]
     fn page_tells_alternatives_what_is_left_and_what_to_measure() {
         let cause = Cause {
+            rivals: Vec::new(),
             effect: "payload_mass",
             sentence: "The load is 2 kg heavier.".to_owned(),
             parameters: Vec::new(),
             alternatives: vec!["valve_lag"],
-            rivals: Vec::new(),
             experiment: "a second load",
         };
         let page = page_of(&everything(Verdict::Ambiguous, vec![cause]));
