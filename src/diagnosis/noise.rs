@@ -35,6 +35,9 @@ pub fn estimate(residuals: &[f64], period: f64) -> Noise {
     let lags = lags(period, residuals.len());
     let seen: Vec<(usize, f64)> =
         lags.into_iter().filter_map(|lag| Some((lag, bend_variance(residuals, lag)?))).collect();
+    if seen.iter().all(|(_, variance)| *variance <= 0.0) {
+        return Noise { level: 0.0, inflation: 1.0 };
+    }
     let fits = MEMORIES.iter().filter_map(|memory| fit(&seen, period, *memory));
     let best = fits.min_by(|a, b| a.2.total_cmp(&b.2));
     let Some((memory, [white, coloured, _], _)) = best else { return Noise { level: 0.0, inflation: 1.0 } };
@@ -73,7 +76,8 @@ fn fit(seen: &[(usize, f64)], period: f64, memory: f64) -> Option<(f64, [f64; 3]
         [6.0, 6.0 - 8.0 * kept + 2.0 * kept * kept, (lag as f64 / longest).powi(4)]
     };
     // Relative errors count: a variance is known to a share of itself.
-    let weight = |variance: f64| 1.0 / variance.max(f64::MIN_POSITIVE);
+    let largest = seen.iter().map(|(_, variance)| *variance).fold(0.0, f64::max);
+    let weight = |variance: f64| 1.0 / variance.max(1e-12 * largest);
     let subsets = (1..8_usize).map(|mask| (0..3).filter(|k| mask >> k & 1 == 1).collect::<Vec<usize>>());
     let solutions = subsets.filter_map(|used| {
         let matrix = DMatrix::from_fn(seen.len(), used.len(), |i, j| row(seen[i].0)[used[j]] * weight(seen[i].1));
