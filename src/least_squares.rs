@@ -290,7 +290,7 @@ mod tests {
         let residuals = |p: &[f64]| Some(vec![p[0] - 3.0, p[0] + p[1]]);
         let found = fit(&residuals, &[free(0.0, -1.0, 1.0), free(0.0, -5.0, 5.0)], &[], EFFORT);
         assert_eq!(found.parameters[0], 1.0);
-        assert!((found.parameters[1] + 1.0).abs() < 1e-6, "{found:?}");
+        assert!((found.parameters[1] + 1.0).abs() < 2e-3, "{found:?}");
     }
 
     #[test]

@@ -392,7 +392,8 @@ mod tests {
     #[test]
     fn links_of_a_true_model_have_no_residual() {
         let recording = simulated(&[]);
-        for (link, limit) in [(Link::Valve, 50.0), (Link::Muscle, 0.1), (Link::Load, 0.5), (Link::Reading, 1e-5)] {
+        // What is left comes from rates of change, which are means over some hundredths of a second.
+        for (link, limit) in [(Link::Valve, 50.0), (Link::Muscle, 0.1), (Link::Load, 0.5), (Link::Reading, 2e-5)] {
             let size = rms(&residual(&recording, link));
             assert!(size < limit, "{link:?}: {size}");
         }
