@@ -53,7 +53,7 @@ enum Command {
     },
     /// Say what the simulation gets wrong and why, and extend the model
     #[command(after_help = "Example:\n  sinew diagnose run1.csv run2.csv --out diagnosis\n\n\
-        With several recordings the last is held out from the fits; of a single one, its end.")]
+        The last 40 % of each recording are held out from the fits.")]
     Diagnose {
         #[command(flatten)]
         recordings: RecordingSource,
