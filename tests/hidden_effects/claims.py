@@ -1,8 +1,8 @@
 """The rates that docs/diagnosis.md claims, which a fresh batch must not contradict.
 
-To be set after each measurement. What the project wants to reach is more: 97, 99, 95, 85 and 99 %. A batch contradicts a claim
-when, if the claim held, so few hits or fewer would come up with a probability below IMPROBABLE. A sound tool fails less
-than once in a thousand batches per claim, one that has become much worse nearly always.
+To be set after each measurement. What the project wants to reach is more: 97, 99, 95, 85 and 99 %. A batch
+contradicts a claim when, if the claim held, so few hits or fewer would come up with a probability below IMPROBABLE. A
+sound tool fails less than once in a thousand batches per claim, one that has become much worse nearly always.
 """
 
 from scipy.stats import binom
