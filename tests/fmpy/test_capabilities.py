@@ -81,6 +81,8 @@ def test_dependencies_are_exact(fmu):
     """An output depends on the inputs that the description lists, and on no other."""
     listed = fmu.unknowns("outputs")
     with running(fmu) as instance:
+        if "series_elasticity.compliance" in fmu.variables:  # what stretches makes a reading depend on the force
+            instance.set({"series_elasticity.compliance": -5e-6})
         for output in fmu.names("output"):
             acting = [known for known in fmu.names("input") if instance.derivative(output, known) != 0.0]
             assert acting == sorted(listed[output], key=fmu.names("input").index), output
