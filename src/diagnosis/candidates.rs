@@ -107,6 +107,15 @@ impl Hypothesis {
         freed.map(|(name, _)| declared(&Parameters::default(), name).0).collect()
     }
 
+    /// Whether an effect would have to be larger than it can be: the fit ended at a bound of its size.
+    pub fn is_impossible(&self, parameters: &Parameters) -> bool {
+        self.parts.iter().any(|part| {
+            let (size, _) = part.effect.forms[part.form][0];
+            let ((variable, value), neutral) = (declared(parameters, size), declared(&Parameters::default(), size).1);
+            value != neutral && (value <= variable.min || value >= variable.max)
+        })
+    }
+
     /// How many parameters the effects have.
     pub fn size(&self) -> usize {
         self.parts.iter().map(|part| part.freed().count()).sum()

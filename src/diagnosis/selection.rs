@@ -247,9 +247,9 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The best hypothesis of all levels, without effects that it can spare.
     fn best(&self, levels: &[Vec<Judged>]) -> Option<Judged> {
         let shows = |best: &&Judged| self.shows(&self.baseline.losses, &best.fitted.losses);
-        let mut best = levels[0].first().filter(|best| best.evidence > LEAST_EVIDENCE).filter(shows)?;
+        let mut best = possible(&levels[0]).filter(|best| best.evidence > LEAST_EVIDENCE).filter(shows)?;
         for level in &levels[1..] {
-            let Some(more) = level.first().filter(|more| self.is_worth(best, more)) else { break };
+            let Some(more) = possible(level).filter(|more| self.is_worth(best, more)) else { break };
             best = more;
         }
         Some(self.pruned(best.clone()))
@@ -331,6 +331,11 @@ impl<'a, 'b> Search<'a, 'b> {
         other.fitted.hypothesis.names() != best.fitted.hypothesis.names()
             && evidence(&other.fitted, &best.fitted) < RIVAL
     }
+}
+
+/// The best hypothesis whose effects are no larger than they can be.
+fn possible(level: &[Judged]) -> Option<&Judged> {
+    level.iter().find(|judged| !judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters))
 }
 
 /// The hypotheses that are carried on: the best, and for each signal the one that leaves least of it, since of two effects

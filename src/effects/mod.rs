@@ -70,7 +70,7 @@ pub struct Description {
     pub reference: &'static str,
     /// Whether it concerns the load, and so means nothing to a muscle that is moved from outside.
     pub of_load: bool,
-    /// Common forms of the effect, each the parameters that a fit frees; the best form stands for the cause.
+    /// Common forms of the effect, each the parameters that a fit frees, its size first; the best form stands for the cause.
     pub forms: &'static [&'static [Freed]],
     /// Parameters that are freed as well once the effect leads, and stay free only where the data pay for them.
     pub refinements: &'static [Freed],
