@@ -156,6 +156,10 @@ pub trait Effect: Declared + Default {
     fn muscle_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
         force
     }
+    /// Length in m by which what is between muscle and load stretches under a pull in N.
+    fn stretch(&self, _force: f64) -> f64 {
+        0.0
+    }
     /// Moving mass in kg.
     fn mass(&self, mass: f64) -> f64 {
         mass
@@ -321,6 +325,12 @@ macro_rules! effects {
             pub fn static_force(&self, mut force: f64) -> f64 {
                 $(force = self.$field.static_force(force);)*
                 force
+            }
+
+            /// Length in m by which what is between muscle and load stretches under a pull in N.
+            #[inline]
+            pub fn stretch(&self, force: f64) -> f64 {
+                0.0 $(+ self.$field.stretch(force))*
             }
 
             /// Moving mass in kg.
