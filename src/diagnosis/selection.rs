@@ -32,9 +32,10 @@ const BEAM: usize = 3;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
 /// Candidates that are fitted, of those that look promising: for the first effect, and for further ones.
-const FITTED: (usize, usize) = (10, 7);
-/// Starts from which a candidate is fitted.
+const FITTED: (usize, usize) = (6, 5);
+/// Starts from which a candidate is fitted, and the share of the first one's promise that a further one must have.
 const STARTS: usize = 2;
+const ALSO_PROMISING: f64 = 0.5;
 
 /// A hypothesis with what speaks for it.
 #[derive(Clone)]
@@ -176,7 +177,8 @@ impl<'a, 'b> Search<'a, 'b> {
         starts.sort_by(|a, b| b[0].promise.total_cmp(&a[0].promise));
         starts.truncate(most);
         let best = |starts: Vec<Start>| {
-            let fits = starts.iter().take(STARTS).filter_map(|start| {
+            let also = ALSO_PROMISING * starts[0].promise;
+            let fits = starts.iter().take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
                 Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &start.parameters)?))
             });
             fits.max_by(|a, b| a.score.total_cmp(&b.score))
