@@ -118,8 +118,8 @@ class Muscles:
 def simulate(muscles, command_at, duration, step_size=2e-3, start=MIDDLE):
     """Moves the platform from rest; `command_at` gives the four commands in V at a time in s.
 
-    Returns courses by name, each of shape (n_steps + 1, …): times, poses, tensions, pressures, and `energy` in J: kinetic
-    and potential energy of the platform less the work of the muscles, which must stay what it was.
+    Returns courses by name, each of shape (n_steps + 1, …): times, poses, tensions, pressures, and `energy` in J:
+    kinetic and potential energy of the platform less the work of the muscles, which must stay what it was.
     """
     muscles.start(start)
     pose, velocity = start.copy(), np.zeros(3)

@@ -4,8 +4,8 @@
     python fmpy_closed_loop.py fmus/ClosedLoop.ssp --out closed_loop.png
 
 Needs fmpy, numpy and matplotlib (pip). `simulate` is a Jacobi master: all FMUs step at once, then they exchange values.
-It initialises the FMUs with the values of their connections, as libcosim and ecos do. FMPy's own `simulate_ssp` does not:
-it gives every input 0 for the first step, here a valve that is shut for a moment.
+It initialises the FMUs with the values of their connections, as libcosim and ecos do. FMPy's own `simulate_ssp` does
+not: it gives every input 0 for the first step, here a valve that is shut for a moment.
 """
 
 import argparse

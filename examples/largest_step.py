@@ -2,10 +2,11 @@
 
     python largest_step.py --sinew target/release/sinew --parameters dmsp-40-1000
 
-Needs sinew, fmpy and numpy (pip). ClosedLoop.ssp moves 20, 40 and 80 kg along its reference with growing steps; the
-worst load counts. A step is stable if the error after the motion decays. The master exchanges all values at once (Jacobi), as
-FMPy, libcosim and ecos do, or in the order of the signals, where the controller's command is of this moment and not of
-the last step; inputs are held during a step, or go on with the derivative that the output had (fmi2SetRealInputDerivatives).
+Needs sinew, fmpy and numpy (pip). ClosedLoop.ssp moves 20, 40 and 80 kg along its reference with growing
+steps; the worst load counts. A step is stable if the error after the motion decays. The master exchanges all values at
+once (Jacobi), as FMPy, libcosim and ecos do, or in the order of the signals, where the controller's command is of this
+moment and not of the last step. Inputs are held during a step (derivatives off), or go on with the derivative that the
+output had at its beginning (on; fmi2SetRealInputDerivatives).
 """
 
 import argparse
@@ -75,7 +76,8 @@ def main():
           + " | ".join(f"error at {1e3 * step:g} ms" for step in SHOWN) + " |")
     print("|---|---|---|" + "---|" * len(SHOWN))
     with tempfile.TemporaryDirectory() as folder:
-        systems = [export(arguments.sinew, arguments.parameters, arguments.target, mass, Path(folder)) for mass in MASSES]
+        systems = [export(arguments.sinew, arguments.parameters, arguments.target, mass, Path(folder))
+                   for mass in MASSES]
         motion = end_of_motion(systems[0])
         for name, how, derivatives in MASTERS:
             errors = measure(systems, motion, how, derivatives)

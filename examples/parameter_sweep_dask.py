@@ -4,9 +4,9 @@
     python parameter_sweep_dask.py fmus/PneumaticMuscle.fmu --out sweep.csv
     python parameter_sweep_dask.py fmus/PneumaticMuscle.fmu --out sweep.csv --scheduler tcp://host:8786
 
-Needs fmpy, numpy and distributed (pip). Every worker loads the FMU once and makes one instance, which fmi2Reset brings back
-to its beginning for each case. A worker that is lost is replaced, and what it had not delivered is done anew. The results
-are those of `--serial`, bit for bit and in the same order.
+Needs fmpy, numpy and distributed (pip). Every worker loads the FMU once and makes one instance, which fmi2Reset brings
+back to its beginning for each case. A worker that is lost is replaced, and what it had not delivered is done anew. The
+results are those of `--serial`, bit for bit and in the same order.
 """
 
 import argparse
@@ -55,7 +55,7 @@ class Muscle(WorkerPlugin):
         self.slave.setReal([self.references[name] for name in values], list(values.values()))
 
     def simulate(self, case):
-        """Contraction after a step of the command: how far it goes in m, how far beyond, and when it stays within 2 %."""
+        """Contraction after a step of the command: how far it goes in m, how far beyond, when it stays within 2 %."""
         self.slave.reset()
         self.set({"initial.gauge_pressure": START_PRESSURE, "valve.command": COMMAND, **case})
         self.slave.setupExperiment()

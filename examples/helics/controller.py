@@ -1,4 +1,4 @@
-"""The process of the controller: ReferenceTrajectory.fmu and PidFeedForward.fmu as one HELICS federate. `run.py` starts it."""
+"""The process of the controller: two FMUs, its setpoint among them, as one HELICS federate. `run.py` starts it."""
 
 import argparse
 

@@ -3,8 +3,8 @@
     sinew export --out fmus
     python helics/run.py fmus --out muscle.csv
 
-Needs fmpy and helics (pip). On two machines: `helics_broker --federates=2` on one, and `muscle.py` and `controller.py`, each
-with `--broker ADDRESS` and the `--pressure` that is printed here, where they belong.
+Needs fmpy and helics (pip). On two machines: `helics_broker --federates=2` on one, and `muscle.py` and `controller.py`,
+each with `--broker ADDRESS` and the `--pressure` that is printed here, where they belong.
 """
 
 import argparse
