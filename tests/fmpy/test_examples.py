@@ -11,8 +11,9 @@ from distributed import Client, LocalCluster
 
 import cable_robot
 import fmpy_closed_loop
+import largest_step
 import parameter_sweep_dask
-from support import EXAMPLES, run
+from support import EXAMPLES, ROOT, run
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,21 @@ def test_input_derivatives_come_nearer_to_the_limit_of_small_steps(fmus):
     limit = contraction(5e-4, derivatives=True)
     held, moving = (np.abs(contraction(1e-2, derivatives) - limit).max() for derivatives in (False, True))
     assert moving < 0.5 * held, (held, moving)
+
+
+def test_readme_states_the_largest_stable_steps(sinew, tmp_path):
+    """As examples/largest_step.py prints them; run it and copy its table where this fails after a change of the loop."""
+    systems = [largest_step.export(sinew, "dmsp-40-1000", 0.15, mass, tmp_path) for mass in largest_step.MASSES]
+    motion = largest_step.end_of_motion(systems[0])
+    readme = (ROOT / "README.md").read_text()
+    for name, how, derivatives in largest_step.MASTERS:
+        row = next(line for line in readme.splitlines() if f"| {name} | {'on' if derivatives else 'off'} |" in line)
+        stated = float(row.split("|")[3].removesuffix(" ms ")) * 1e-3
+        place = [round(step, 6) for step in largest_step.STEPS].index(round(stated, 6))
+        errors = [max(largest_step.largest_error(ssp, step, motion, how, derivatives) for ssp in systems)
+                  for step in largest_step.STEPS[place:place + 2]]
+        assert errors[0] < np.inf, f"{row} is not stable"
+        assert errors[1] == np.inf, f"{row} is stable with longer steps as well"
 
 
 def loaded_libraries(dask_worker):

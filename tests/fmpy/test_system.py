@@ -1,8 +1,8 @@
 """The closed loop as a system of FMUs: valid, and every importer that runs it gets the same numbers.
 
 The importers are FMPy, libcosim and ecos (C++), a master in Rust with the crate `fmi`, and fmucontainer (C), which
-makes one FMU of the loop. All but FMPy's own `simulate_ssp` initialise the FMUs with what their connections say and then
-let all step at once. `simulate_ssp` begins with zeros at all inputs; the Rust master can do so too, and then agrees.
+makes one FMU of the loop. All but FMPy's own `simulate_ssp` initialise the FMUs with what their connections say and
+then let all step at once. `simulate_ssp` begins with zeros at all inputs; the Rust master can do so too, and agrees.
 """
 
 import ctypes
