@@ -91,8 +91,12 @@ class Fmu:
 class Log(list):
     """What an FMU told its host: (status, category, message)."""
 
+    # FMPy gives the messages of all FMUs to the logger that was made last: it has to live as long as the process.
+    _all = []
+
     def __init__(self):
         super().__init__()
+        self._all.append(self)
         self.callbacks = fmi2CallbackFunctions()
         self.callbacks.logger = fmi2CallbackLoggerTYPE(self._take)
         self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
