@@ -10,6 +10,7 @@ each with `--broker ADDRESS` and the `--pressure` that is printed here, where th
 import argparse
 import subprocess
 import sys
+import time
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
@@ -37,15 +38,21 @@ def main():
     arguments = parser.parse_args()
     pressure = start_pressure(arguments.fmus / "ClosedLoop.ssp")
     common = ["--pressure", repr(pressure), "--step-size", repr(arguments.step_size), "--steps", str(arguments.steps)]
-    broker = helics.helicsCreateBroker("zmq", "", "--federates=2")
+    broker = helics.helicsCreateBroker("zmq", "", "--federates=2 --loglevel=error")
     processes = [subprocess.Popen([sys.executable, str(HERE / program), *options, *common]) for program, options in (
         ("muscle.py", [str(arguments.fmus / "PneumaticMuscle.fmu"), "--out", arguments.out]),
         ("controller.py", [str(arguments.fmus / f"{name}.fmu") for name in ("ReferenceTrajectory", "PidFeedForward")]))]
-    statuses = [process.wait() for process in processes]
+    while any(process.poll() is None for process in processes):
+        if any(process.poll() for process in processes):  # one has failed: the other would wait for it for ever
+            for process in processes:
+                process.terminate()
+        time.sleep(0.02)
+    failed = any(process.returncode for process in processes)
     helics.helicsBrokerDisconnect(broker)
     helics.helicsCloseLibrary()
-    print(f"started at {pressure:.1f} Pa; see {arguments.out}" if not any(statuses) else "a federate failed")
-    sys.exit(any(statuses))
+    if failed:
+        sys.exit("a federate has failed; its messages are above")
+    print(f"started at {pressure:.1f} Pa; see {arguments.out}")
 
 
 if __name__ == "__main__":
