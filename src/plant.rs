@@ -3,6 +3,7 @@
 use crate::effects::{Effects, Point, Readings};
 use crate::memory::{Line, PlantMemory};
 use crate::model::{Documentation, Extended, Extent, Feedthrough, Passage, Step, System};
+use crate::muscle::bisect;
 use crate::parameters::Parameters;
 use crate::variables::Signals;
 use crate::{Error, GRAVITY, Result};
@@ -96,7 +97,8 @@ fn muscle_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
     let Parameters { muscle, force_models, effects, unknown_cause, .. } = parameters;
     let pressure = effects.effective_pressure(at, at.gauge_pressure);
     let contraction = effects.effective_contraction(at, own, at.contraction);
-    let of_area = effects.area_force(at, own, pressure * force_models.virtual_area(muscle, contraction));
+    let of_pressure = force_models.pressure_force(muscle, pressure, contraction, at.contraction_velocity);
+    let of_area = effects.area_force(at, own, of_pressure);
     let elastic = effects.elastic_force(at, own, force_models.elastic_force(muscle, contraction));
     let static_force = effects.static_force(of_area + elastic);
     let force = effects.muscle_force(at, own, static_force - muscle.damping * at.contraction_velocity);
@@ -107,7 +109,9 @@ fn muscle_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
 #[inline]
 fn nominal_force(parameters: &Parameters, at: &Point) -> f64 {
     let Parameters { muscle, force_models, .. } = parameters;
-    force_models.force(muscle, at.gauge_pressure, at.contraction) - muscle.damping * at.contraction_velocity
+    force_models.pressure_force(muscle, at.gauge_pressure, at.contraction, at.contraction_velocity)
+        + force_models.elastic_force(muscle, at.contraction)
+        - muscle.damping * at.contraction_velocity
 }
 
 /// Gauge pressure in Pa that a command in V asks for.
@@ -166,10 +170,11 @@ pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) 
     if rate(0.0) <= 0.0 { 0.0 } else { bisect(rate, 0.0, highest) }
 }
 
-/// Gauge pressure in Pa at which a weight in N hangs still at a contraction in m.
+/// Gauge pressure in Pa at which a weight in N hangs still at a contraction in m; see [`ForceModels::holding_pressure`].
+///
+/// [`ForceModels::holding_pressure`]: crate::muscle::ForceModels::holding_pressure
 pub fn holding_pressure(parameters: &Parameters, contraction: f64, weight: f64) -> f64 {
-    let Parameters { muscle, force_models, .. } = parameters;
-    (weight - force_models.elastic_force(muscle, contraction)) / force_models.virtual_area(muscle, contraction)
+    parameters.force_models.holding_pressure(&parameters.muscle, contraction, weight)
 }
 
 /// As [`holding_pressure`], with the effects as they are at the start; never below ambient.
@@ -200,21 +205,6 @@ pub fn equilibrium(parameters: &Parameters, gauge_pressure: f64, weight: f64) ->
     let at = |k: i32| muscle.rest_length * (-0.2 + 0.7 * f64::from(k) / f64::from(samples));
     let bracket = (0..samples).find(|&k| surplus(at(k)) > 0.0 && surplus(at(k + 1)) <= 0.0)?;
     Some(bisect(surplus, at(bracket), at(bracket + 1)))
-}
-
-/// Root of a function that is positive at `low` and not at `high`, to the last bit.
-fn bisect(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    loop {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            return middle;
-        }
-        if function(middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
 }
 
 /// Muscle, valve and a load that hangs from it.

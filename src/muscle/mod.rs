@@ -70,15 +70,29 @@ impl Muscle {
     }
 }
 
-/// A static force model whose pull is affine in pressure: F = p A(x) + F_e(x).
+/// A static force model: F = F_p(p, x, v) + F_e(x), the pull of the pressure, and that of the membrane without pressure.
 ///
-/// The feed-forward of the controller inverts it in this form.
+/// For most models the pressure works on an area that depends on the contraction alone, F_p = p A(x); these give A and
+/// F_e, and no more.
 pub trait ForceModel {
-    /// Virtual area A = −dV/dL in m² at a contraction in m: newtons gained per pascal.
-    fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64;
+    /// Virtual area A = ∂F/∂p in m² of the resting muscle at a gauge pressure in Pa and a contraction in m: newtons gained
+    /// per pascal. Without elasticity it is −dV/dL.
+    fn virtual_area(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64;
 
-    /// Force in N of the elastic membrane at a contraction in m; negative where it resists shortening.
+    /// Force in N without pressure at a contraction in m; negative where the membrane resists shortening.
     fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64;
+
+    /// Pull in N of a gauge pressure in Pa at a contraction in m and its rate in m/s; none without pressure.
+    #[inline]
+    fn pressure_force(
+        &self,
+        muscle: &Muscle,
+        gauge_pressure: f64,
+        contraction: f64,
+        _contraction_velocity: f64,
+    ) -> f64 {
+        gauge_pressure * self.virtual_area(muscle, gauge_pressure, contraction)
+    }
 }
 
 macro_rules! force_models {
@@ -148,11 +162,29 @@ force_models! {
     McKibben(McKibben, mckibben) = 3, "mckibben", "ideal McKibben braid, without any elasticity (thesis eq. 4.15, corrected)";
 }
 
+/// Gauge pressure in Pa up to which [`ForceModels::holding_pressure`] looks for one that holds.
+const HIGHEST_PRESSURE: f64 = 2e6;
+
 impl ForceModels {
-    /// Virtual area in m² of the chosen model, with the muscle's correction.
+    /// Virtual area ∂F/∂p in m² of the chosen model at rest, with the muscle's correction.
     #[inline]
-    pub fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64 {
-        muscle.area_correction(contraction) * self.chosen(muscle.force_model).virtual_area(muscle, contraction)
+    pub fn virtual_area(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
+        let area = self.chosen(muscle.force_model).virtual_area(muscle, gauge_pressure, contraction);
+        muscle.area_correction(contraction) * area
+    }
+
+    /// Pull in N of the pressure in the chosen model, with the muscle's correction.
+    #[inline]
+    pub fn pressure_force(
+        &self,
+        muscle: &Muscle,
+        gauge_pressure: f64,
+        contraction: f64,
+        contraction_velocity: f64,
+    ) -> f64 {
+        let model = self.chosen(muscle.force_model);
+        muscle.area_correction(contraction)
+            * model.pressure_force(muscle, gauge_pressure, contraction, contraction_velocity)
     }
 
     /// Elastic force in N of the chosen model, with the muscle's correction.
@@ -161,9 +193,44 @@ impl ForceModels {
         muscle.elastic_correction(contraction) * self.chosen(muscle.force_model).elastic_force(muscle, contraction)
     }
 
-    /// Static pull in N of the chosen model.
+    /// Pull in N of the chosen model at rest.
     #[inline]
     pub fn force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
-        gauge_pressure * self.virtual_area(muscle, contraction) + self.elastic_force(muscle, contraction)
+        self.pressure_force(muscle, gauge_pressure, contraction, 0.0) + self.elastic_force(muscle, contraction)
+    }
+
+    /// Gauge pressure in Pa at which the resting muscle pulls with a force in N at a contraction in m: the lowest below
+    /// 20 bar at which the pull grows with pressure. Where there is none it is extrapolated from 0 or 20 bar along the
+    /// tangent.
+    pub fn holding_pressure(&self, muscle: &Muscle, contraction: f64, pull: f64) -> f64 {
+        let lack = |pressure: f64| pull - self.force(muscle, pressure, contraction);
+        let along_tangent = |from: f64| from + lack(from) / self.virtual_area(muscle, from, contraction);
+        let first = along_tangent(0.0);
+        // Exact where the pressure works on an area that does not depend on it.
+        let reached = lack(first).abs() <= 1e-9 * pull.abs().max(1.0);
+        if reached || first.is_nan() || lack(0.0) <= 0.0 {
+            return first;
+        }
+        let samples = 50;
+        let at = |k: i32| HIGHEST_PRESSURE * f64::from(k) / f64::from(samples);
+        match (0..samples).find(|&k| lack(at(k)) > 0.0 && lack(at(k + 1)) <= 0.0) {
+            Some(k) => bisect(lack, at(k), at(k + 1)),
+            None => along_tangent(HIGHEST_PRESSURE),
+        }
+    }
+}
+
+/// Root of a function that is positive at `low` and not at `high`, to the last bit.
+pub(crate) fn bisect(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return middle;
+        }
+        if function(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
     }
 }

@@ -30,7 +30,7 @@ crate::variables::variables! {
 }
 
 impl ForceModel for VirtualArea {
-    fn virtual_area(&self, _muscle: &Muscle, contraction: f64) -> f64 {
+    fn virtual_area(&self, _muscle: &Muscle, _gauge_pressure: f64, contraction: f64) -> f64 {
         self.area_0 + self.area_1 * contraction
     }
 
