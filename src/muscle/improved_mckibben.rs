@@ -39,8 +39,8 @@ impl ImprovedMcKibben {
 }
 
 impl ForceModel for ImprovedMcKibben {
-    fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64 {
-        McKibben.virtual_area(muscle, contraction)
+    fn virtual_area(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
+        McKibben.virtual_area(muscle, gauge_pressure, contraction)
     }
 
     fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64 {

@@ -30,7 +30,7 @@ impl Declared for McKibben {
 }
 
 impl ForceModel for McKibben {
-    fn virtual_area(&self, muscle: &Muscle, contraction: f64) -> f64 {
+    fn virtual_area(&self, muscle: &Muscle, _gauge_pressure: f64, contraction: f64) -> f64 {
         let length = muscle.rest_length - contraction;
         (3.0 * length.powi(2) - muscle.thread_length.powi(2)) / (4.0 * PI * muscle.turns.powi(2))
     }
@@ -59,7 +59,7 @@ mod tests {
                 let (x, h) = (muscle.rest_length * 0.012 * f64::from(k), 1e-5 * muscle.rest_length);
                 // x = L0 - L, hence dx = -dL.
                 let difference = (muscle.volume(x + h) - muscle.volume(x - h)) / (2.0 * h);
-                let area = force_models.virtual_area(&muscle, x);
+                let area = force_models.virtual_area(&muscle, 1e5, x);
                 assert!((area - difference).abs() < 1e-8, "{preset} at {x}: {area} {difference}");
             }
         }
