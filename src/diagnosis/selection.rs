@@ -19,7 +19,7 @@ const LEAST_EXPLAINED: (f64, f64) = (0.95, 0.8);
 const LEAST_FURTHER: f64 = 0.8;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
-/// Share of a signal's error that a named effect may leave without a further effect being looked for: a seventh of its
+/// Share of a signal's error that a named effect may leave without a further effect being looked for: a tenth of its
 /// rms is how the form of an effect differs from the true one.
 const LEFT_BY_FORM: f64 = 0.01;
 /// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
