@@ -30,6 +30,8 @@ pub mod diagnosis;
 #[cfg(feature = "tool")]
 pub mod export;
 #[cfg(feature = "tool")]
+pub mod identification;
+#[cfg(feature = "tool")]
 pub mod least_squares;
 #[cfg(feature = "tool")]
 pub mod measurement;
