@@ -24,6 +24,8 @@ pub mod reference;
 pub mod valve;
 
 #[cfg(feature = "tool")]
+pub mod comparison;
+#[cfg(feature = "tool")]
 pub mod demo;
 #[cfg(feature = "tool")]
 pub mod diagnosis;

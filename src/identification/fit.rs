@@ -14,7 +14,7 @@
 //! doi 10.2307/1912934; effective size as of a first-order autoregression, doi 10.1175/1520-0442 (Zwiers and von Storch 1995).
 
 use super::points::{Point, median};
-use super::structure::{Structure, forces};
+use super::structure::{Parameter, Structure, forces};
 use crate::least_squares::{self, Effort, Ended, Free};
 use crate::parameters::Parameters;
 use nalgebra::{DMatrix, DVector};
@@ -124,7 +124,7 @@ impl Problem<'_> {
         let coarse = Problem { structure: self.structure, points: &few };
         let weights = vec![1.0; few.len()];
         let starts = (0..=STARTS).map(|start| {
-            let spread = |(k, p): (usize, &super::structure::Parameter)| {
+            let spread = |(k, p): (usize, &Parameter)| {
                 if start == 0 {
                     return p.given;
                 }
@@ -261,14 +261,15 @@ impl Problem<'_> {
     }
 }
 
-use super::structure::Parameter;
-
 /// Weighted least squares with bounds: a coefficient that leaves them is put there, the others are solved for anew.
 fn bounded_linear(columns: &[Vec<f64>], right: &[f64], weights: &[f64], bounds: &[[f64; 2]]) -> Option<Vec<f64>> {
     let mut amounts = vec![0.0; columns.len()];
     let mut open: Vec<usize> = (0..columns.len()).collect();
     let roots: Vec<f64> = weights.iter().map(|w| w.sqrt()).collect();
     let mut rest: Vec<f64> = right.to_vec();
+    if right.len() < columns.len() {
+        return None;
+    }
     while !open.is_empty() {
         let matrix = DMatrix::from_fn(right.len(), open.len(), |row, k| roots[row] * columns[open[k]][row]);
         let lengths: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();

@@ -253,18 +253,18 @@ impl<'a> Columns<'a> {
     /// Means in motion. At both ends of a recording there are no derivatives, and no points.
     fn moving(&self, recording: usize) -> Vec<Point> {
         let chunks = self.chunks();
-        let time: Vec<f64> = chunks.iter().map(|chunk| chunk.time).collect();
-        let contraction: Vec<f64> = chunks.iter().map(|chunk| chunk.contraction).collect();
-        let velocity = slopes(&time, &contraction);
-        let acceleration = slopes(&time, &velocity);
+        let contraction = self.recording.bridged(Signal::Contraction).unwrap_or_default();
+        let velocity = slopes(&self.recording.time, &contraction);
+        let acceleration = slopes(&self.recording.time, &velocity);
         let inside = 2..chunks.len().saturating_sub(2);
         inside
-            .filter(|&k| time[k + 2] - time[k - 2] < 8.0 * CHUNK)
+            .filter(|&k| chunks[k + 2].time - chunks[k - 2].time < 8.0 * CHUNK)
             .map(|k| {
                 let mut point = mean_point(&chunks[k..=k], recording, self.recording);
-                point.contraction_velocity = velocity[k];
+                let samples = chunks[k].first..=chunks[k].last;
+                point.contraction_velocity = mean(&velocity[samples.clone()]);
                 if let (None, Some(mass)) = (self.force, self.mass) {
-                    point.force = mass * (GRAVITY + acceleration[k]);
+                    point.force = mass * (GRAVITY + mean(&acceleration[samples]));
                 }
                 point
             })
@@ -338,6 +338,10 @@ fn mark_branches(points: &mut [Point]) {
     if let [first, second, ..] = points {
         first.branch = second.branch;
     }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Largest less smallest of the values that are known.

@@ -279,3 +279,9 @@ fn nearby(k: usize, parameter: &Parameter) -> f64 {
 fn uneven(k: usize) -> f64 {
     0.5 + 0.5 * (0.618_033_988_749_895 * (k + 1) as f64).fract()
 }
+
+/// How many static points a fit of these models needs: twice as many as the largest has parameters, and two.
+pub fn fewest_points(models: &[ForceModelName], given: &Parameters) -> usize {
+    let own = |model: &ForceModelName| candidates(given, ForceModels::GROUPS[position(*model)], &[]).len();
+    2 * models.iter().map(own).max().unwrap_or(0) + 2
+}
