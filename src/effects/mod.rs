@@ -70,7 +70,7 @@ pub struct Description {
     pub reference: &'static str,
     /// Whether it concerns the load, and so means nothing to a muscle that is moved from outside.
     pub of_load: bool,
-    /// Common forms of the effect, each the parameters that a fit frees; the best form stands for the cause.
+    /// Common forms of the effect, each the parameters that a fit frees, its size first; the best form stands for the cause.
     pub forms: &'static [&'static [Freed]],
     /// Parameters that are freed as well once the effect leads, and stay free only where the data pay for them.
     pub refinements: &'static [Freed],
@@ -155,6 +155,10 @@ pub trait Effect: Declared + Default {
     /// Pull of the muscle in N.
     fn muscle_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
         force
+    }
+    /// Length in m by which what is between muscle and load stretches under a pull in N.
+    fn stretch(&self, _force: f64) -> f64 {
+        0.0
     }
     /// Moving mass in kg.
     fn mass(&self, mass: f64) -> f64 {
@@ -321,6 +325,12 @@ macro_rules! effects {
             pub fn static_force(&self, mut force: f64) -> f64 {
                 $(force = self.$field.static_force(force);)*
                 force
+            }
+
+            /// Length in m by which what is between muscle and load stretches under a pull in N.
+            #[inline]
+            pub fn stretch(&self, force: f64) -> f64 {
+                0.0 $(+ self.$field.stretch(force))*
             }
 
             /// Moving mass in kg.
