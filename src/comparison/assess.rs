@@ -2,7 +2,7 @@
 
 use super::errors::{Class, Errors, classes, contraction, force, levels, pressure};
 use crate::identification::fit::{Fitted, Start, fit};
-use crate::identification::points::Point;
+use crate::identification::points::{Point, thinned};
 use crate::identification::structure::{Braid, Structure, forces};
 use crate::muscle::ForceModelName;
 use crate::parameters::Parameters;
@@ -65,7 +65,7 @@ impl Assessed {
     pub fn of(model: ForceModelName, braid: Braid, given: &Parameters, points: &[Point]) -> Self {
         let structure = Structure::of(model, braid, given, points);
         let fitted = fit(&structure, points, Start::Wide);
-        let held_out = blocks(points).into_iter().map(|(name, all)| held_out(name, &all, &fitted, points)).collect();
+        let held_out = blocks(points).into_iter().filter_map(|(name, all)| held_out(name, &all, &fitted, points)).collect();
         Self::described(fitted, held_out, points)
     }
 
@@ -96,10 +96,10 @@ impl Assessed {
         }
     }
 
-    /// The greatest error on points that were left out, N; that of the fit where nothing could be left out.
+    /// By what models are put in order: the error in N on pressures that were left out, or else on what could be; where
+    /// nothing could be left out there is nothing to trust, and the error is infinite.
     pub fn held_out_rms(&self) -> f64 {
-        let worst = self.held_out.iter().map(|held| held.rms).fold(0.0, f64::max);
-        if self.held_out.is_empty() { self.errors.rms } else { worst }
+        self.held_out.first().map_or(f64::INFINITY, |held| if held.rms.is_nan() { f64::INFINITY } else { held.rms })
     }
 
     /// Number of fitted parameters.
@@ -130,28 +130,31 @@ fn blocks(points: &[Point]) -> Vec<(&'static str, Vec<Class>)> {
     all.into_iter().filter(|(_, classes)| useful(classes)).collect()
 }
 
-/// Cross-validation: classes are dealt out to folds, every fold is left out once.
-fn held_out(blocks: &'static str, classes: &[Class], fitted: &Fitted, points: &[Point]) -> HeldOut {
-    let folds = classes.len().min(FOLDS);
-    let stride = points.len().div_ceil(MOST_POINTS).max(1);
-    let mut fold_of = vec![0; points.len()];
-    for (k, class) in classes.iter().enumerate() {
-        class.members.iter().for_each(|&member| fold_of[member] = k % folds);
+/// Cross-validation: the inner classes are dealt out to folds, every fold is left out once. The first and the last class
+/// stay, so that models are asked to interpolate. `None` where the rest of the points cannot tell the parameters.
+fn held_out(blocks: &'static str, classes: &[Class], fitted: &Fitted, points: &[Point]) -> Option<HeldOut> {
+    let inner = &classes[1..classes.len() - 1];
+    let folds = inner.len().min(FOLDS);
+    let mut fold_of = vec![None; points.len()];
+    for (k, class) in inner.iter().enumerate() {
+        class.members.iter().for_each(|&member| fold_of[member] = Some(k % folds));
     }
-    let used: Vec<usize> = (0..points.len()).step_by(stride).collect();
+    let used = thinned(points.len(), MOST_POINTS);
     let mut residuals = Vec::new();
     for fold in 0..folds {
         let part = |inside: bool| -> Vec<Point> {
-            used.iter().filter(|&&k| (fold_of[k] == fold) == inside).map(|&k| points[k]).collect()
+            used.iter().filter(|&&k| (fold_of[k] == Some(fold)) == inside).map(|&k| points[k]).collect()
         };
         let (test, training) = (part(true), part(false));
-        if training.len() <= fitted.values.len() {
-            continue;
+        let Structure { model, braid, ref base, .. } = fitted.structure;
+        let told = Structure::of(model, braid, base, &training);
+        if told.free.len() < fitted.structure.free.len() || training.len() <= told.free.len() {
+            return None;
         }
         let refitted = fit(&fitted.structure, &training, Start::Near(&fitted.values));
         let modelled = forces(&refitted.parameters, &test);
         residuals.extend(test.iter().zip(modelled).map(|(point, force)| (point.force - force, point.force)));
     }
-    let rms = Errors::of(residuals.into_iter()).map_or(f64::NAN, |errors| errors.rms);
-    HeldOut { blocks, folds, rms }
+    let rms = Errors::of(residuals.into_iter())?.rms;
+    Some(HeldOut { blocks, folds, rms })
 }

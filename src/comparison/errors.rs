@@ -56,7 +56,7 @@ pub struct Class {
 /// A gap of such a share of the range parts two levels.
 const GAP: f64 = 0.01;
 /// More levels than this are a continuum.
-const MOST_LEVELS: usize = 16;
+const MOST_LEVELS: usize = 32;
 /// A continuum is cut into so many classes of equal width.
 const CUTS: usize = 8;
 

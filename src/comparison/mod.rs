@@ -38,7 +38,7 @@ pub struct OnMuscle {
     pub given: Parameters,
     /// What was compared with.
     pub points: Points,
-    /// Models by their greatest error on points that were left out.
+    /// Models by their error on pressures that were left out.
     pub models: Vec<Assessed>,
     /// How many independent points these are worth, by the residuals of the best model.
     pub effective: f64,
@@ -79,7 +79,10 @@ pub fn compare(muscles: Vec<Muscle>, models: &[ForceModelName]) -> Result<Compar
         let points = Points::of(&muscle.recordings, fewest_points(models, &muscle.given))?;
         let assessed = assess_all(models, &muscle.given, &points, &[Braid::Given, Braid::Fitted]);
         let effective = assessed.first().map_or(0.0, |best| best.fitted.effective);
-        Ok(OnMuscle { name: muscle.name, given: muscle.given, points, models: assessed, effective })
+        // Nobody should take for measured what was not.
+        let reconstructed = muscle.recordings.iter().any(|recording| recording.name().contains("reconstructed"));
+        let name = if reconstructed { format!("{} (reconstructed)", muscle.name) } else { muscle.name };
+        Ok(OnMuscle { name, given: muscle.given, points, models: assessed, effective })
     };
     let muscles = muscles.into_iter().map(on_muscle).collect::<Result<Vec<_>>>()?;
     let cross = cross::between(&muscles);

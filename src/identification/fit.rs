@@ -13,7 +13,7 @@
 //! G. Golub and V. Pereyra (1973), doi 10.1137/0710036; P. Huber (1964), doi 10.1214/aoms/1177703732; H. White (1980),
 //! doi 10.2307/1912934; effective size as of a first-order autoregression, doi 10.1175/1520-0442 (Zwiers and von Storch 1995).
 
-use super::points::{Point, median};
+use super::points::{Point, median, thinned};
 use super::structure::{Parameter, Structure, forces};
 use crate::least_squares::{self, Effort, Ended, Free};
 use crate::parameters::Parameters;
@@ -24,13 +24,15 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 const ROBUST: f64 = 2.0;
 /// Rounds of new weights at most.
 const ROUNDS: usize = 25;
-/// Places from which a fit starts beside the given one.
-const STARTS: usize = 7;
+/// Places that are looked at beside the given one.
+const PLACES: usize = 40;
+/// The best of them, from which a fit starts.
+const STARTS: usize = 6;
 /// Most points that are looked at from every start.
-const COARSE: usize = 300;
+const COARSE: usize = 150;
 /// Below this share of the largest singular value a direction is said to be weak.
 const WEAK: f64 = 1e-3;
-const LOOK: Effort = Effort { iterations: 12, small_decrease: 1e-3 };
+const LOOK: Effort = Effort { iterations: 15, small_decrease: 1e-3 };
 const POLISH: Effort = Effort { iterations: 60, small_decrease: 1e-12 };
 
 /// Where a fit starts.
@@ -119,21 +121,28 @@ impl Problem<'_> {
         if nonlinear.is_empty() {
             return given;
         }
-        let stride = self.points.len().div_ceil(COARSE).max(1);
-        let few: Vec<Point> = self.points.iter().step_by(stride).copied().collect();
+        let few: Vec<Point> = thinned(self.points.len(), COARSE).into_iter().map(|k| self.points[k]).collect();
         let coarse = Problem { structure: self.structure, points: &few };
         let weights = vec![1.0; few.len()];
-        let starts = (0..=STARTS).map(|start| {
+        let place = |start: usize| {
             let spread = |(k, p): (usize, &Parameter)| {
                 if start == 0 {
                     return p.given;
                 }
                 let away = 2.0 * halton(start, [2, 3, 5, 7, 11, 13][k % 6]) - 1.0;
-                let value = if p.given == 0.0 { away * p.typical() } else { p.given * 3_f64.powf(away) };
+                // Within a factor of three, and every other one within ten.
+                let factor = if start % 2 == 0 { 3_f64 } else { 10.0 };
+                let value = if p.given == 0.0 { away * p.typical() } else { p.given * factor.powf(away) };
                 value.clamp(p.bounds[0], p.bounds[1])
             };
-            nonlinear.iter().enumerate().map(spread).collect::<Vec<f64>>()
-        });
+            let values: Vec<f64> = nonlinear.iter().enumerate().map(spread).collect();
+            let absolute = |s: Solution| s.residuals.iter().map(|r| r.abs()).sum::<f64>();
+            coarse.solution(&values, &weights).map(|solution| (absolute(solution), values))
+        };
+        let mut starts: Vec<(f64, Vec<f64>)> = (0..=PLACES).filter_map(place).collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts.truncate(STARTS);
+        let starts = starts.into_iter().map(|(_, start)| start);
         let looked = starts.filter_map(|start| {
             let found = coarse.search(&start, &weights, LOOK);
             (found.ended != Ended::NoStart).then_some((found.cost, found.parameters))

@@ -344,6 +344,19 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+/// At most `most` of so many positions, ascending: without a stride, which on a grid would meet few of its columns.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+pub(crate) fn thinned(count: usize, most: usize) -> Vec<usize> {
+    if count <= most {
+        return (0..count).collect();
+    }
+    let place = |k: usize| ((0.618_033_988_749_895 * k as f64).fract() * count as f64) as usize;
+    let mut places: Vec<usize> = (0..most).map(place).collect();
+    places.sort_unstable();
+    places.dedup();
+    places
+}
+
 /// Largest less smallest of the values that are known.
 pub(crate) fn range(values: &[f64]) -> f64 {
     let known = values.iter().filter(|v| !v.is_nan());

@@ -41,7 +41,7 @@ pub fn sentences(found: &Identification) -> Vec<String> {
         fitted.effective
     )];
     for held in &all.held_out {
-        said.push(format!("{:.1} N rms on points that the fit did not see, every {} left out once.", held.rms, held.blocks));
+        said.push(format!("{:.1} N rms on points that the fit did not see, every inner {} left out once.", held.rms, held.blocks));
     }
     if let Some((_, best)) = found.rivals.first() {
         let next = found.rivals.get(1).map_or(String::new(), |(label, rms)| format!("; next is {label} with {rms:.1} N"));
@@ -165,10 +165,16 @@ pub fn to_json(found: &Identification) -> Value {
     })
 }
 
+/// Model and recordings.
+fn title(found: &Identification) -> String {
+    let more = if found.recordings.len() > 1 { " and others" } else { "" };
+    format!("{} on {}{more}", found.found.fitted.structure.label(), found.recordings[0])
+}
+
 /// Measured and modelled force, and what is left of it, as SVG.
 fn plots(found: &Identification) -> Vec<(String, String)> {
     let (points, residuals) = (&found.points.all, &found.found.fitted.residuals);
-    let label = found.found.fitted.structure.label();
+    let label = title(found);
     let over = |of: fn(&Point) -> f64, size: f64| points.iter().map(|p| of(p) / size).collect::<Vec<f64>>();
     let (bars, millimetres) = (over(pressure, 1e5), over(contraction, 1e-3));
     let dots = |x: &[f64]| {

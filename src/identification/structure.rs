@@ -9,7 +9,7 @@
 //! derivative is a combination of those before it is held at its given value. So E and δ come as a product, and
 //! δ stays where it is.
 
-use super::points::Point;
+use super::points::{Point, thinned};
 use crate::muscle::{ForceModelName, ForceModels};
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Kind, Scalar, Variable};
@@ -79,6 +79,15 @@ const AFFINE: f64 = 1e-9;
 /// A derivative counts as a combination of others where less than this share of it is left.
 const DEPENDENT: f64 = 1e-6;
 
+/// Choices of whoever makes a model, and not properties of a muscle.
+const CHOSEN: [&str; 5] = [
+    "spring.blend_end",
+    "spring.blend_start",
+    "tondu_lopez_friction.smoothing_velocity",
+    "tondu_lopez_kq.high_pressure",
+    "tondu_lopez_kq.low_pressure",
+];
+
 const BRAID: [&str; 2] = ["muscle.thread_length", "muscle.turns"];
 const DAMPING: &str = "muscle.damping";
 
@@ -101,8 +110,7 @@ pub fn forces(parameters: &Parameters, points: &[Point]) -> Vec<f64> {
     let Parameters { muscle, force_models, .. } = parameters;
     let force = |point: &Point| {
         let Point { gauge_pressure, contraction, contraction_velocity, .. } = *point;
-        force_models.pressure_force(muscle, gauge_pressure, contraction, contraction_velocity)
-            + force_models.elastic_force(muscle, contraction)
+        force_models.moving_force(muscle, gauge_pressure, contraction, contraction_velocity)
             - muscle.damping * contraction_velocity
     };
     points.iter().map(force).collect()
@@ -120,8 +128,7 @@ impl Structure {
         base.muscle.area_tilt = neutral.area_tilt;
         base.muscle.area_bend = neutral.area_bend;
         base.muscle.elastic_tilt = neutral.elastic_tilt;
-        let stride = points.len().div_ceil(PROBES).max(1);
-        let probes: Vec<Point> = points.iter().step_by(stride).copied().collect();
+        let probes: Vec<Point> = thinned(points.len(), PROBES).into_iter().map(|k| points[k]).collect();
         let own = candidates(&base, ForceModels::GROUPS[position(model)], points);
         let extra: &[&str] = if braid == Braid::Fitted { &BRAID } else { &[] };
         let others = extra.iter().chain([&DAMPING]).filter_map(|name| parameter(&base, name, points));
@@ -249,7 +256,7 @@ impl Structure {
 fn candidates(base: &Parameters, group: &str, points: &[Point]) -> Vec<Parameter> {
     let mut names = Vec::new();
     base.force_models.visit(&mut |variable, _| {
-        if variable.group() == group && matches!(variable.kind, Kind::Real) {
+        if variable.group() == group && matches!(variable.kind, Kind::Real) && !CHOSEN.contains(&variable.name) {
             names.push(variable.name);
         }
     });
