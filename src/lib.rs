@@ -24,11 +24,15 @@ pub mod reference;
 pub mod valve;
 
 #[cfg(feature = "tool")]
+pub mod comparison;
+#[cfg(feature = "tool")]
 pub mod demo;
 #[cfg(feature = "tool")]
 pub mod diagnosis;
 #[cfg(feature = "tool")]
 pub mod export;
+#[cfg(feature = "tool")]
+pub mod identification;
 #[cfg(feature = "tool")]
 pub mod least_squares;
 #[cfg(feature = "tool")]

@@ -3,9 +3,12 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
+use sinew::comparison::{self, Muscle, compare};
 use sinew::diagnosis::plan::{self, Limits, Plan, Task};
 use sinew::diagnosis::{self, Diagnosis, diagnose, report};
 use sinew::effects::Effects;
+use sinew::identification::structure::{Braid, all_models, model_name};
+use sinew::identification::{self, identify};
 use sinew::measurement::{self, Recording, Signal};
 use sinew::models::models;
 use sinew::muscle::ForceModelName;
@@ -49,6 +52,51 @@ enum Command {
         parameters: ParameterSource,
         /// Folder for simulated.csv and the plots
         #[arg(long, default_value = "sinew-simulated")]
+        out: PathBuf,
+    },
+    /// Fit a force model to recordings
+    #[command(after_help = "Examples:\n  sinew identify isotonic.csv --model improved-mckibben --parameters my-muscle.toml --out identified\n  \
+        sinew export --parameters identified/parameters.toml --out fmus\n\n\
+        --parameters gives the geometry (muscle.rest_length above all) and where the fit starts. Without --model it is the one \
+        with the smallest error on points that were left out.")]
+    Identify {
+        #[command(flatten)]
+        recordings: RecordingSource,
+        #[command(flatten)]
+        parameters: ParameterSource,
+        /// Force model (see `sinew list models`) [default: the best on points that were left out]
+        #[arg(long, value_name = "NAME", value_parser = force_model)]
+        model: Option<ForceModelName>,
+        /// Keep thread length and turns as --parameters has them
+        #[arg(long)]
+        fixed_braid: bool,
+        /// Folder for parameters.toml, identification.json and the plots
+        #[arg(long, default_value = "sinew-identified")]
+        out: PathBuf,
+    },
+    /// Fit every force model to recordings and compare them
+    #[command(after_help = "Examples:\n  sinew compare map.csv --parameters my-muscle.toml --out comparison\n  \
+        sinew compare isotonic.csv --models mckibben,improved-mckibben,virtual-area\n  \
+        sinew compare --muscle dmsp-40-1000=long.csv --muscle dmsp-40-290=short1.csv,short2.csv\n\n\
+        Several muscles are compared one by one, and the parameters of each are tried on the others. What stands before the = \
+        is a preset or parameter file with the geometry of the muscle (muscle.rest_length above all), and its name.")]
+    Compare {
+        /// Recordings of one muscle: CSV files with a header `name [unit]` per column
+        #[arg(value_name = "RECORDING.csv", required_unless_present = "muscles", conflicts_with = "muscles")]
+        files: Vec<PathBuf>,
+        /// Header of a foreign file and what it means here, as in --map "p_mus=gauge_pressure [bar]"
+        #[arg(long = "map", value_name = "THEIRS=OURS", value_parser = renaming)]
+        renamed: Vec<(String, String)>,
+        #[command(flatten)]
+        parameters: ParameterSource,
+        /// Geometry and recordings of a muscle; once for each muscle
+        #[arg(long = "muscle", value_name = "PARAMETERS=FILE[,FILE]", value_parser = muscle_files)]
+        muscles: Vec<(String, Vec<PathBuf>)>,
+        /// Force models [default: all]
+        #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', value_parser = force_model)]
+        models: Vec<ForceModelName>,
+        /// Folder for report.html, comparison.json and comparison.md
+        #[arg(long, default_value = "sinew-compared")]
         out: PathBuf,
     },
     /// Say what the simulation gets wrong and why, and extend the model
@@ -205,6 +253,21 @@ fn renaming(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
+fn muscle_files(text: &str) -> std::result::Result<(String, Vec<PathBuf>), String> {
+    match text.split_once('=') {
+        Some((source, files)) if !source.is_empty() && !files.is_empty() => {
+            Ok((source.to_owned(), files.split(',').map(PathBuf::from).collect()))
+        }
+        _ => Err("write PARAMETERS=FILE,FILE, as in dmsp-40-290=short.csv".to_owned()),
+    }
+}
+
+fn force_model(text: &str) -> std::result::Result<ForceModelName, String> {
+    let known = || all_models().into_iter().map(model_name).collect::<Vec<_>>().join(", ");
+    let found = all_models().into_iter().find(|model| model_name(*model) == text);
+    found.ok_or_else(|| format!("one of {}", known()))
+}
+
 fn tolerance(text: &str) -> std::result::Result<f64, String> {
     let value: f64 = text.trim_end_matches('%').trim().parse().map_err(|_| "not a number".to_owned())?;
     let value = if text.ends_with('%') { value / 100.0 } else { value };
@@ -245,6 +308,13 @@ fn run(command: Command) -> Result<Answer> {
     match command {
         Command::Export { parameters, out, libraries } => export_fmus(&parameters.load()?, &out, &libraries),
         Command::Simulate { recordings, parameters, out } => simulate(&parameters.load()?, &recordings.read()?, &out),
+        Command::Identify { recordings, parameters, model, fixed_braid, out } => {
+            run_identification(&parameters.load()?, &recordings.read()?, model, fixed_braid, &out)
+        }
+        Command::Compare { files, renamed, parameters, muscles, models, out } => {
+            let all = if muscles.is_empty() { vec![(parameters.source, files)] } else { muscles };
+            run_comparison(all, &renamed, models, &out)
+        }
         Command::Diagnose { recordings, parameters, tolerance, out } => {
             run_diagnosis(&parameters.load()?, &recordings.read()?, tolerance, &out)
         }
@@ -287,6 +357,58 @@ fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Re
 
 fn listed(files: &[PathBuf]) -> String {
     files.iter().map(|path| format!("{}\n", path.display())).collect()
+}
+
+fn run_identification(
+    parameters: &Parameters,
+    recordings: &[Recording],
+    model: Option<ForceModelName>,
+    fixed_braid: bool,
+    out: &Path,
+) -> Result<Answer> {
+    let braid = if fixed_braid { Braid::Given } else { Braid::Fitted };
+    let found = identify(recordings, parameters, model, braid)?;
+    let files = export::write_whole(identification::report::files(&found, out))?;
+    let mut json = identification::report::to_json(&found);
+    json["files"] = json!(files);
+    let mut rows = vec![["parameter", "value", "95 % from", "to", "unit"].map(str::to_owned)];
+    let fitted = &found.found.fitted;
+    for ((free, value), half) in fitted.structure.free.iter().zip(&fitted.values).zip(&fitted.half_widths) {
+        let bound = |sign: f64| half.map_or("at its bound".to_owned(), |half| format!("{:.5e}", value + sign * half));
+        let (name, unit) = (free.variable.name.to_owned(), free.variable.unit.symbol.to_owned());
+        rows.push([name, format!("{value:.5e}"), bound(-1.0), bound(1.0), unit]);
+    }
+    let rows = rows.into_iter().map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect();
+    found.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    let said = identification::report::sentences(&found).join("\n");
+    Ok(Answer { text: format!("{said}\n\n{}\n{}", table(rows).text, listed(&files)), json })
+}
+
+fn run_comparison(
+    muscles: Vec<(String, Vec<PathBuf>)>,
+    renamed: &[(String, String)],
+    models: Vec<ForceModelName>,
+    out: &Path,
+) -> Result<Answer> {
+    let models = if models.is_empty() { all_models() } else { models };
+    let read = |(source, files): (String, Vec<PathBuf>)| -> Result<Muscle> {
+        let given = Parameters::load(&source)?;
+        let stem = Path::new(&source).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = if Path::new(&source).is_file() { stem } else { source };
+        Ok(Muscle { name, given, recordings: measurement::read_all(&files, renamed)? })
+    };
+    let found = compare(muscles.into_iter().map(read).collect::<Result<_>>()?, &models)?;
+    let files = export::write_whole(comparison::report::files(&found, out))?;
+    let mut text = String::new();
+    for muscle in &found.muscles {
+        muscle.points.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        let rows = comparison::report::table_of(muscle);
+        let rows = rows.into_iter().map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect();
+        text += &format!("{}\n\n{}\n", comparison::report::headline(muscle), table(rows).text);
+    }
+    let mut json = comparison::report::to_json(&found);
+    json["files"] = json!(files);
+    Ok(Answer { text: text + &listed(&files), json })
 }
 
 fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {

@@ -67,6 +67,8 @@ pub struct Recording {
     name: String,
     /// Time in s, strictly increasing, shape `(n_samples,)`.
     pub time: Vec<f64>,
+    /// Line of the file that each sample stands in, shape `(n_samples,)`; empty where there is no file.
+    lines: Vec<u64>,
     /// The other signals in SI units, each of shape `(n_samples,)`; NaN where a sample is missing.
     signals: BTreeMap<Signal, Vec<f64>>,
     /// Unit that the file names for each column.
@@ -113,9 +115,11 @@ impl Recording {
             let problem = "there is no column `time [s]`".to_owned();
             return Err(Error::Csv { path: path.to_owned(), line: 1, column: None, problem });
         }
+        let mut lines = Vec::new();
         for row in reader.records() {
             let row = row.map_err(|error| csv_error(path, &error))?;
             let line = row.position().map_or(0, csv::Position::line);
+            lines.push(line);
             for (cell, column) in row.iter().zip(&columns) {
                 if let Some(column) = column {
                     let value = column.value(cell, path, line)?;
@@ -128,13 +132,13 @@ impl Recording {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let time = signals.remove(&Time).unwrap_or_default();
         let units = columns.iter().flatten().map(|column| (column.signal, column.unit)).collect();
-        Self { path: path.to_owned(), name, time, signals, units, notes }.checked()
+        Self { path: path.to_owned(), name, time, lines, signals, units, notes }.checked()
     }
 
     /// An experiment that is yet to be made: its inputs in SI units, each of shape `(n_samples,)`.
     pub(crate) fn planned(name: &str, time: Vec<f64>, inputs: BTreeMap<Signal, Vec<f64>>) -> Self {
         let (path, name) = (PathBuf::from(name), name.to_owned());
-        Self { path, name, time, signals: inputs, units: BTreeMap::new(), notes: Vec::new() }
+        Self { path, name, time, lines: Vec::new(), signals: inputs, units: BTreeMap::new(), notes: Vec::new() }
     }
 
     /// Refuses what no use could be made of, and drops rows without a new time.
@@ -147,6 +151,8 @@ impl Recording {
                 let mut keep = fresh.iter();
                 values.retain(|_| *keep.next().unwrap_or(&true));
             }
+            let mut keep = fresh.iter();
+            self.lines.retain(|_| *keep.next().unwrap_or(&true));
         }
         let problem = |problem: &str| Error::Recording { path: self.path.clone(), problem: problem.to_owned() };
         if self.time.len() < FEWEST_SAMPLES {
@@ -178,6 +184,11 @@ impl Recording {
     /// A signal in SI units, NaN where a sample is missing; `None` where there is no such column.
     pub fn get(&self, signal: Signal) -> Option<&[f64]> {
         self.signals.get(&signal).map(Vec::as_slice)
+    }
+
+    /// Line of the file that a sample stands in, from 1; 0 where there is no file.
+    pub fn line(&self, sample: usize) -> u64 {
+        self.lines.get(sample).copied().unwrap_or(0)
     }
 
     /// Unit that the file names for a signal; `None` where there is no such column.

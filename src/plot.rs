@@ -5,7 +5,7 @@ use plotters::prelude::*;
 /// One curve of a plot.
 #[derive(Debug, Clone, Copy)]
 pub struct Curve<'a> {
-    /// What the legend says.
+    /// What the legend says; nothing where it is empty.
     pub label: &'a str,
     /// Horizontal values; NaN is left out.
     pub x: &'a [f64],
@@ -23,18 +23,25 @@ const MOST_POINTS: usize = 1200;
 
 /// A plot of curves over a common axis, as an SVG text.
 pub fn plot(title: &str, x_label: &str, y_label: &str, curves: &[Curve]) -> String {
+    scatter(title, x_label, y_label, &[], curves)
+}
+
+/// A plot of points and of curves, as an SVG text.
+pub fn scatter(title: &str, x_label: &str, y_label: &str, dots: &[Curve], curves: &[Curve]) -> String {
     let mut svg = String::new();
-    draw(&mut svg, title, x_label, y_label, curves).expect("text takes every drawing");
+    draw(&mut svg, title, x_label, y_label, dots, curves).expect("text takes every drawing");
     svg
 }
 
 type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
-fn draw(svg: &mut String, title: &str, x_label: &str, y_label: &str, curves: &[Curve]) -> Drawn {
+fn draw(svg: &mut String, title: &str, x_label: &str, y_label: &str, dots: &[Curve], curves: &[Curve]) -> Drawn {
     let area = SVGBackend::with_string(svg, (760, 340)).into_drawing_area();
-    let range = |pick: fn(&Curve) -> Vec<f64>, above: f64| padded(curves.iter().flat_map(pick), above);
+    let all = || dots.iter().chain(curves);
+    let range = |pick: fn(&Curve) -> Vec<f64>, above: f64| padded(all().flat_map(pick), above);
+    let labelled = all().filter(|curve| !curve.label.is_empty()).count();
     // Room for the legend, so that it hides nothing.
-    let above = if curves.len() > 1 { 0.1 + 0.09 * curves.len() as f64 } else { 0.05 };
+    let above = if labelled > 1 { 0.1 + 0.09 * labelled as f64 } else { 0.05 };
     let mut chart = ChartBuilder::on(&area)
         .caption(title, ("sans-serif", 17))
         .margin(10)
@@ -50,12 +57,22 @@ fn draw(svg: &mut String, title: &str, x_label: &str, y_label: &str, curves: &[C
         .x_labels(8)
         .y_labels(6)
         .draw()?;
+    for curve in dots {
+        let color = PALETTE[curve.color % PALETTE.len()];
+        let circles = points(curve).into_iter().map(|at| Circle::new(at, 2, color.filled()));
+        let drawn = chart.draw_series(circles)?;
+        if !curve.label.is_empty() {
+            drawn.label(curve.label).legend(move |(x, y)| Circle::new((x + 8, y), 3, color.filled()));
+        }
+    }
     for curve in curves {
         let color = PALETTE[curve.color % PALETTE.len()];
         let drawn = chart.draw_series(LineSeries::new(points(curve), color.stroke_width(1)))?;
-        drawn.label(curve.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(3)));
+        if !curve.label.is_empty() {
+            drawn.label(curve.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(3)));
+        }
     }
-    if curves.len() > 1 {
+    if labelled > 1 {
         chart
             .configure_series_labels()
             .position(SeriesLabelPosition::UpperRight)

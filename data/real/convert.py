@@ -4,6 +4,8 @@
     git -C zillen checkout 6e0bcb4633bd53b2a8544cdbd497c4c06539afc7
     python convert.py zillen          # writes cylinder/*.csv and chamber/*.csv; needs numpy
     python convert.py                 # writes map/*.csv alone, from published/
+
+A characteristic without a length becomes that of a muscle of 1 m.
 """
 
 import sys
@@ -21,6 +23,7 @@ ZERO_OF_CONTRACTION = 40.0  # mm on the laser: the piston is pushed in as far as
 THINNING = 2  # every second sample
 VALVE_SHUT = 6.0  # s; the supply is still connected at the start of each file, until 5.1 s where it shows
 VALVE_GAIN = 1.0  # bar/V, that of the default parameters
+HIGHEST_FORCE = {"festo_dmsp_40": 6000, "festo_dmsp_20": 1500}  # N, of the catalogue
 POINT_LASTS = 1.0  # s, on the made-up time axis of a static map
 
 
@@ -78,7 +81,21 @@ def static_map(source, target):
     write(target, "time [s],contraction [mm],gauge_pressure [bar],force [N]", [".0f", ".1f", ".5f", ".1f"], columns)
 
 
+def characteristic(source, target):
+    """FESTO's characteristic over the ratio of contraction, curve after curve, as a muscle of 1 m.
+
+    Forces beyond what the catalogue allows, and those of a slack muscle, are extrapolations of the tool and left out.
+    """
+    kilopascal, ratio, newton = np.genfromtxt(source, delimiter=",", skip_header=1).T
+    shown = (newton > 0) & (newton <= HIGHEST_FORCE[source.name.split("_sizing")[0]])
+    order = np.flatnonzero(shown)[np.lexsort((ratio[shown], kilopascal[shown]))]
+    columns = [POINT_LASTS * np.arange(len(order)), 1e3 * ratio[order], kilopascal[order] / 100, newton[order]]
+    write(target, "time [s],contraction [mm],gauge_pressure [bar],force [N]", [".0f", ".1f", ".2f", ".1f"], columns)
+
+
 def main(zillen=None):
+    for name in HIGHEST_FORCE:
+        characteristic(HERE / f"published/{name}_sizing_tool.csv", HERE / f"map/{name}.csv")
     for name in ["dmsp_20_300", "dmsp_10_250"]:
         static_map(HERE / f"published/martens_boblan_{name}.csv", HERE / f"map/{name}.csv")
     if zillen:
