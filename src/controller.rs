@@ -16,18 +16,19 @@ crate::variables::variables! {
     /// time constant T_f. The command stays within its limits, and the integral stops while it is at one.
     ///
     /// # Validity
-    /// The default gains keep the peak of the sensitivity function below 1.8 on the linearised plant for both muscles,
-    /// 20–80 kg and contractions up to 20 % of the rest length.
+    /// The gains of the presets are those of `sinew tune`, rounded: on the linearised plant, 20–80 kg and contractions up to
+    /// 20 % of the rest length, the peak of the sensitivity function stays below 2.02 although load, force and dead time are not
+    /// known; see `docs/closed-loop.md`.
     ///
     /// # Reference
     /// Thesis eq. 5.6; filter and limits are additions.
     pub struct Controller in "controller." as Tunable {
         /// Proportional gain
-        proportional_gain: f64 = 0.5, VOLT_PER_METRE, (-1e5..=1e5);
+        proportional_gain: f64 = 0.05, VOLT_PER_METRE, (-1e5..=1e5);
         /// Integral gain
-        integral_gain: f64 = 20.0, VOLT_PER_METRE_SECOND, (-1e6..=1e6);
+        integral_gain: f64 = 22.5, VOLT_PER_METRE_SECOND, (-1e6..=1e6);
         /// Derivative gain
-        derivative_gain: f64 = 0.25, VOLT_SECOND_PER_METRE, (-1e5..=1e5);
+        derivative_gain: f64 = 0.23, VOLT_SECOND_PER_METRE, (-1e5..=1e5);
         /// Time constant of the derivative filter
         filter_time_constant: f64 = 0.005, SECOND, (1e-5..=10.0);
         /// Smallest command

@@ -27,6 +27,8 @@ use rayon::prelude::*;
 pub const RANGE: f64 = 0.204;
 /// Peak of the sensitivity that no plant may exceed: a gain margin of 2 and a phase margin of 29° at least.
 pub const SENSITIVITY_BOUND: f64 = 2.0;
+/// Parts of the stroke that are asked whether gains of their own would pay.
+const THIRDS: usize = 3;
 /// Contractions that the working range is divided into.
 const CONTRACTIONS: usize = 7;
 /// Dead time that a tuned loop bears, s.
@@ -131,6 +133,13 @@ impl Tuning {
     pub fn worst(&self) -> &PointMargins {
         worst(&self.margins)
     }
+
+    /// By how much gains that are scheduled over the contraction could be larger where they are smallest.
+    pub fn gain_of_scheduling(&self) -> f64 {
+        let parts = self.scheduling.iter().take(THIRDS);
+        let smallest = parts.map(|part| part.integral_gain).fold(f64::INFINITY, f64::min);
+        smallest / self.parameters.controller.integral_gain
+    }
 }
 
 /// The one with the largest sensitivity.
@@ -173,7 +182,7 @@ struct Sampled {
 
 impl Sampled {
     fn of(plant: LinearPlant) -> Self {
-        let response = frequencies(&plant, 160).into_iter().map(|at| (at, plant.response(at))).collect();
+        let response = frequencies(&plant, 600).into_iter().map(|at| (at, plant.response(at))).collect();
         Self { plant, response }
     }
 
@@ -210,17 +219,17 @@ pub fn tune(parameters: &Parameters, masses: &[f64]) -> Result<Tuning> {
         placement,
         margins: judged(&tuned),
         before: judged(parameters),
-        scheduling: scheduling(parameters, masses, &points),
+        scheduling: scheduling(&tuned, masses, &points),
     })
 }
 
-/// What gains of their own would bring to thirds of the stroke, and to each load.
+/// What gains of their own would bring to thirds of the stroke, and to each load, where the parameters have the gains for all.
 fn scheduling(parameters: &Parameters, masses: &[f64], points: &[OperatingPoint]) -> Vec<Part> {
-    let third = RANGE * parameters.muscle.rest_length / 3.0;
+    let third = RANGE * parameters.muscle.rest_length / THIRDS as f64;
     let rounding = 1e-9;
     let mut parts: Vec<(String, Vec<OperatingPoint>)> = Vec::new();
-    for k in 0..3 {
-        let (low, high) = (f64::from(k) * third, f64::from(k + 1) * third);
+    for k in 0..THIRDS {
+        let (low, high) = (k as f64 * third, (k + 1) as f64 * third);
         let within = |p: &&OperatingPoint| p.contraction >= low - rounding && p.contraction <= high + rounding;
         let name = format!("contraction {:.0} to {:.0} mm", 1e3 * low, 1e3 * high);
         parts.push((name, points.iter().filter(within).copied().collect()));
@@ -232,8 +241,10 @@ fn scheduling(parameters: &Parameters, masses: &[f64], points: &[OperatingPoint]
     }
     let tuned = |(name, points): (String, Vec<OperatingPoint>)| {
         let (design, placement) = place(parameters, &points).ok()?;
-        let controller = placement.controller(&design.plant(parameters), &parameters.controller);
-        Some(Part { name, integral_gain: controller.integral_gain })
+        let own = placement.controller(&design.plant(parameters), &parameters.controller);
+        // The search ends at a local optimum; a part bears what the whole does.
+        let integral_gain = own.integral_gain.max(parameters.controller.integral_gain);
+        Some(Part { name, integral_gain })
     };
     parts.into_par_iter().filter_map(tuned).collect()
 }

@@ -62,6 +62,7 @@ pub fn to_json(tuning: &Tuning) -> Value {
         "scheduling": tuning.scheduling.iter().map(|Part { name, integral_gain }| {
             json!({ "part": name, "integral_gain": integral_gain })
         }).collect::<Vec<_>>(),
+        "gain_of_scheduling": tuning.gain_of_scheduling(),
     })
 }
 
@@ -140,8 +141,8 @@ fn root_locus(drawn: &Drawn) -> String {
         near.map(|pole| (pole.re, pole.im)).unzip::<_, _, Vec<_>, Vec<_>>()
     };
     let (mut re, mut im) = (Vec::new(), Vec::new());
-    for k in 1..=400 {
-        let (more_re, more_im) = poles(LARGEST_FACTOR * (f64::from(k) / 400.0).powi(2));
+    for k in 1..=200 {
+        let (more_re, more_im) = poles(LARGEST_FACTOR * (f64::from(k) / 200.0).powi(2));
         re.extend(more_re);
         im.extend(more_im);
     }
@@ -236,7 +237,9 @@ fn page(tuning: &Tuning, before: &Parameters, name: &str) -> String {
         .enumerate()
         .map(|(k, mass)| drawn(OperatingPoint { mass, contraction: middle }, &tuning.parameters, "", k + 1))
         .collect();
-    loops.push(drawn(worst_point, &tuning.parameters, "worst: ", 3));
+    if worst_point.contraction != middle || !lightest_and_heaviest.contains(&worst_point.mass) {
+        loops.push(drawn(worst_point, &tuning.parameters, "worst: ", 3));
+    }
     let compared =
         [drawn(tuning.design, &tuning.parameters, "tuned: ", 2), drawn(tuning.design, before, "before: ", 1)];
     let gain_row = |(name, unit): &(&str, &str)| {
@@ -274,6 +277,7 @@ fn page(tuning: &Tuning, before: &Parameters, name: &str) -> String {
         natural_frequency => short(tuning.placement.natural_frequency),
         damping_ratio => short(tuning.placement.damping_ratio),
         other_product => short(tuning.placement.other_product.sqrt()),
+        scheduling_gain => format!("{:.1}", tuning.gain_of_scheduling()),
         scheduling => tuning.scheduling.iter().map(|part| context! {
             name => part.name.clone(), gain => short(part.integral_gain), factor => format!("{:.1}", part.integral_gain / integral_gain),
         }).collect::<Vec<_>>(),
