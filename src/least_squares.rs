@@ -27,6 +27,15 @@ pub struct Free {
     pub prior: Option<(f64, f64)>,
 }
 
+impl Free {
+    /// The same, counted from a value.
+    pub fn from(&self, value: f64) -> Self {
+        let prior = self.prior.map(|(mean, deviation)| (mean - value, deviation));
+        let (start, lower, upper) = (self.start - value, self.lower - value, self.upper - value);
+        Self { start, lower, upper, typical: self.typical, prior }
+    }
+}
+
 /// When a fit stops.
 #[derive(Debug, Clone, Copy)]
 pub struct Effort {
@@ -216,12 +225,18 @@ pub fn normal_matrix(columns: &[Vec<f64>]) -> DMatrix<f64> {
     normal
 }
 
-/// How much Σ r² can decrease when columns are added to the residuals in amounts within bounds.
+/// How much Σ r², priors among them, can decrease when columns are added to the residuals in amounts within bounds.
 ///
 /// Coordinate descent on the quadratic, which is convex; a hundred sweeps are plenty for a forecast.
 pub fn linear_decrease(residuals: &[f64], columns: &[Vec<f64>], free: &[Free]) -> f64 {
-    let normal = normal_matrix(columns);
-    let gradient: Vec<f64> = columns.iter().map(|column| dot(column, residuals)).collect();
+    let mut normal = normal_matrix(columns);
+    let mut gradient: Vec<f64> = columns.iter().map(|column| dot(column, residuals)).collect();
+    for (k, free) in free.iter().enumerate() {
+        if let Some((mean, deviation)) = free.prior {
+            normal[(k, k)] += deviation.powi(-2);
+            gradient[k] -= mean / deviation.powi(2);
+        }
+    }
     let mut amounts = DVector::zeros(columns.len());
     for _ in 0..100 {
         for k in 0..columns.len() {

@@ -20,6 +20,10 @@ const LIMITS: &str = "Static force identified at 0.5 to 4.5 bar and 100 to 800 N
 const SOURCE: &str = "Master thesis \u{201c}Comparative Assessment and Improvement of Pneumatic Artificial Muscles \
     Modelling\u{201d}, Politecnico di Milano: eqs. 4.5 to 4.11, 4.17 (sign of b\u{b2} corrected), 5.3, 5.4.";
 
+/// Steps of the secant that finds the pull through what stretches, and the relative change of the pull that ends it.
+const MOST_SECANTS: usize = 20;
+const SAME_FORCE: f64 = 1e-12;
+
 crate::variables::signals! {
     /// What acts on the muscle with its hanging load.
     pub struct MuscleInputs as Input {
@@ -91,9 +95,35 @@ fn extent(parameters: &Parameters) -> Extent {
     }
 }
 
-/// Pull of the muscle in N, with damping, effects and correction; `own` are the states of the effects.
+/// Pull in N on a load at a contraction, with damping, effects and correction; `own` are the states of the effects.
+///
+/// The muscle itself contracts further by what stretches between it and the load under that pull: a secant finds it.
 #[inline]
 fn muscle_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
+    let stretched = |force: f64| {
+        let contraction = at.contraction + parameters.effects.stretch(force);
+        rigid_force(parameters, &Point { contraction, ..*at }, own)
+    };
+    let mut before = rigid_force(parameters, at, own);
+    if parameters.effects.stretch(before) == 0.0 {
+        return before;
+    }
+    let mut lack_before = stretched(before) - before;
+    let mut force = before + lack_before;
+    for _ in 0..MOST_SECANTS {
+        let lack = stretched(force) - force;
+        if lack.abs() <= SAME_FORCE * (1.0 + force.abs()) || lack == lack_before {
+            break;
+        }
+        let next = force - lack * (force - before) / (lack - lack_before);
+        (before, lack_before, force) = (force, lack, next);
+    }
+    force
+}
+
+/// As [`muscle_force`], with nothing that stretches.
+#[inline]
+fn rigid_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
     let Parameters { muscle, force_models, effects, unknown_cause, .. } = parameters;
     let pressure = effects.effective_pressure(at, at.gauge_pressure);
     let contraction = effects.effective_contraction(at, own, at.contraction);
@@ -116,14 +146,14 @@ fn nominal_force(parameters: &Parameters, at: &Point) -> f64 {
 
 /// Gauge pressure in Pa that a command in V asks for.
 #[inline]
-fn commanded_pressure(parameters: &Parameters, command: f64) -> f64 {
-    parameters.valve.target_pressure(parameters.effects.command(command))
+fn commanded_pressure(parameters: &Parameters, command: f64, at: &Point, own: &[f64]) -> f64 {
+    parameters.valve.target_pressure(parameters.effects.command(at, own, command))
 }
 
 /// The point with the pressure that the valve goes for.
 #[inline]
 fn with_target(parameters: &Parameters, command: f64, at: Point, own: &[f64]) -> Point {
-    let commanded_pressure = commanded_pressure(parameters, command);
+    let commanded_pressure = commanded_pressure(parameters, command, &at, own);
     let at = Point { commanded_pressure, ..at };
     let target_pressure = parameters.effects.target_pressure(&at, own, commanded_pressure);
     Point { target_pressure: parameters.unknown_cause.target_pressure(&at, target_pressure), ..at }
@@ -166,7 +196,7 @@ pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) 
         let at = with_target(&still, command, at_rest(pressure, contraction), &own);
         pressure_rate(&still, &at, &own)
     };
-    let highest = 1e5 + commanded_pressure(&still, command);
+    let highest = 1e5 + commanded_pressure(&still, command, &at_rest(0.0, contraction), &own);
     if rate(0.0) <= 0.0 { 0.0 } else { bisect(rate, 0.0, highest) }
 }
 
@@ -283,12 +313,13 @@ impl System for PneumaticMuscle {
         let (at, own) = hanging_point(state);
         let force = muscle_force(parameters, &at, own);
         let shown = readings(parameters, time, &at, force, memory);
+        let contraction = at.contraction + parameters.effects.stretch(force);
         MuscleOutputs {
-            contraction: at.contraction,
+            contraction,
             contraction_velocity: at.contraction_velocity,
             gauge_pressure: at.gauge_pressure,
             force,
-            diameter: parameters.muscle.diameter(at.contraction),
+            diameter: parameters.muscle.diameter(contraction),
             measured_contraction: shown.contraction,
             measured_gauge_pressure: shown.gauge_pressure,
             measured_force: shown.force,
@@ -349,7 +380,7 @@ fn readings(parameters: &Parameters, time: f64, at: &Point, force: f64, memory: 
     let effects = &parameters.effects;
     let remembered = memory.contraction_at(time - effects.contraction_delay());
     let contraction = remembered.unwrap_or(at.contraction);
-    effects.readings(Readings { contraction, gauge_pressure: at.gauge_pressure, force })
+    effects.readings(Readings { time, contraction, gauge_pressure: at.gauge_pressure, force })
 }
 
 /// Whether the memory is empty and stays so. An effect that has become neutral is forgotten.

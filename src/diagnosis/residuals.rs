@@ -17,7 +17,7 @@ const FEWEST_SAMPLES: usize = 50;
 const LONGEST_CORRELATION: f64 = 3.0;
 /// Structural error of a nominal muscle beyond its coefficients, as a share of the declared tolerance and of the span of
 /// the signal: a polynomial is never quite the muscle.
-const STRUCTURE_SHARE: f64 = 0.05;
+const STRUCTURE_SHARE: f64 = 0.03;
 /// Length of a block in s: errors of different blocks count as independent.
 const BLOCK: f64 = 2.0;
 /// No sensor is better than this share of what it shows: data without any noise are simulated.

@@ -14,7 +14,7 @@ const LEAST_EVIDENCE: f64 = 10.0;
 const RIVAL: f64 = 3.0;
 /// Share of the error beyond noise that the named causes together must explain: of all samples, and of those that the fit
 /// did not see.
-const LEAST_EXPLAINED: (f64, f64) = (0.9, 0.7);
+const LEAST_EXPLAINED: (f64, f64) = (0.95, 0.8);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
 const LEAST_FURTHER: f64 = 0.8;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
@@ -22,16 +22,20 @@ const NEGLIGIBLE: f64 = 0.25;
 /// Share of a signal's error that a named effect may leave without a further effect being looked for: a seventh of its
 /// rms is how the form of an effect differs from the true one.
 const LEFT_BY_FORM: f64 = 0.02;
+/// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
+/// in the forms, which are never known exactly.
+const ALSO_BY_FORM: f64 = 3.0;
 /// How many times the structural error of a sound model an error must be to be called unexplained.
-const UNEXPLAINED: f64 = 4.0;
+const UNEXPLAINED: f64 = 6.5;
 /// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
 const BEAM: usize = 3;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
 /// Candidates that are fitted, of those that look promising: for the first effect, and for further ones.
-const FITTED: (usize, usize) = (10, 7);
-/// Starts from which a candidate is fitted.
+const FITTED: (usize, usize) = (6, 5);
+/// Starts from which a candidate is fitted, and the share of the first one's promise that a further one must have.
 const STARTS: usize = 2;
+const ALSO_PROMISING: f64 = 0.5;
 
 /// A hypothesis with what speaks for it.
 #[derive(Clone)]
@@ -107,10 +111,15 @@ impl<'a, 'b> Search<'a, 'b> {
     fn judge(&self, fitted: Fitted) -> Judged {
         let evidence = evidence(&self.baseline, &fitted);
         let (before, after) = (beyond_noise(&self.baseline.losses), beyond_noise(&fitted.losses));
-        let explained = 1.0 - total(&after) / total(&before).max(f64::MIN_POSITIVE);
+        let explained = 1.0 - self.unsound(&after) / total(&before).max(f64::MIN_POSITIVE);
         let score = self.bench.data.log_likelihood(&fitted.losses)
             - 0.5 * fitted.hypothesis.size() as f64 * (fitted.residuals.len() as f64).ln();
         Judged { fitted, evidence, score, explained }
+    }
+
+    /// What is left beyond noise and the structural error that a sound model may have.
+    fn unsound(&self, left: &BTreeMap<Signal, f64>) -> f64 {
+        left.iter().map(|(signal, left)| (left - NEGLIGIBLE - self.bench.data.structure(*signal)).max(0.0)).sum()
     }
 
     /// Finds the causes; `done` is told after each candidate.
@@ -168,7 +177,8 @@ impl<'a, 'b> Search<'a, 'b> {
         starts.sort_by(|a, b| b[0].promise.total_cmp(&a[0].promise));
         starts.truncate(most);
         let best = |starts: Vec<Start>| {
-            let fits = starts.iter().take(STARTS).filter_map(|start| {
+            let also = ALSO_PROMISING * starts[0].promise;
+            let fits = starts.iter().take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
                 Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &start.parameters)?))
             });
             fits.max_by(|a, b| a.score.total_cmp(&b.score))
@@ -247,9 +257,9 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The best hypothesis of all levels, without effects that it can spare.
     fn best(&self, levels: &[Vec<Judged>]) -> Option<Judged> {
         let shows = |best: &&Judged| self.shows(&self.baseline.losses, &best.fitted.losses);
-        let mut best = levels[0].first().filter(|best| best.evidence > LEAST_EVIDENCE).filter(shows)?;
+        let mut best = possible(&levels[0]).filter(|best| best.evidence > LEAST_EVIDENCE).filter(shows)?;
         for level in &levels[1..] {
-            let Some(more) = level.first().filter(|more| self.is_worth(best, more)) else { break };
+            let Some(more) = possible(level).filter(|more| self.is_worth(best, more)) else { break };
             best = more;
         }
         Some(self.pruned(best.clone()))
@@ -300,8 +310,7 @@ impl<'a, 'b> Search<'a, 'b> {
         if best.explained < LEAST_EXPLAINED.0 || !self.holds(&best.fitted)? {
             return refused(wrong);
         }
-        let rivals: Vec<&Judged> =
-            levels[best.fitted.hypothesis.parts.len() - 1].iter().filter(|other| self.is_rival(&best, other)).collect();
+        let rivals = self.rivals(&best, &levels[best.fitted.hypothesis.parts.len() - 1]);
         let alternatives: Vec<Vec<&'static str>> =
             best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
         let verdict = if alternatives.iter().any(|a| !a.is_empty()) {
@@ -323,14 +332,38 @@ impl<'a, 'b> Search<'a, 'b> {
             Some(self.bench.data.losses(&trained.residuals, Scope::HeldOut))
         };
         let (without, with) = (on_unseen(&self.baseline)?, on_unseen(fitted)?);
-        let explained = 1.0 - total(&beyond_noise(&with)) / total(&beyond_noise(&without)).max(f64::MIN_POSITIVE);
+        let (before, after) = (beyond_noise(&without), beyond_noise(&with));
+        let explained = 1.0 - self.unsound(&after) / total(&before).max(f64::MIN_POSITIVE);
         Some(gain(&without, &with) > 0.0 && explained > LEAST_EXPLAINED.1)
     }
 
-    fn is_rival(&self, best: &Judged, other: &Judged) -> bool {
-        other.fitted.hypothesis.names() != best.fitted.hypothesis.names()
-            && evidence(&other.fitted, &best.fitted) < RIVAL
+    /// Hypotheses that explain the data as well as the best: all that the odds allow, or else the one whose forms may be why it
+    /// is not the best.
+    fn rivals<'l>(&self, best: &Judged, level: &'l [Judged]) -> Vec<&'l Judged> {
+        let possible = level.iter().filter(|other| {
+            other.fitted.hypothesis.names() != best.fitted.hypothesis.names()
+                && !other.fitted.hypothesis.is_impossible(&other.fitted.parameters)
+        });
+        let (equal, behind): (Vec<_>, Vec<_>) =
+            possible.partition(|other| evidence(&other.fitted, &best.fitted) < RIVAL);
+        let by_form = || behind.into_iter().find(|other| self.differ_by_form(best, other));
+        if equal.is_empty() { by_form().into_iter().collect() } else { equal }
     }
+
+    /// Whether two hypotheses leave so little that their forms decide between them, and not their causes.
+    fn differ_by_form(&self, best: &Judged, other: &Judged) -> bool {
+        let [before, of_best, of_other] =
+            [&self.baseline, &best.fitted, &other.fitted].map(|fitted| beyond_noise(&fitted.losses));
+        before.into_iter().all(|(signal, before)| {
+            let alike = ALSO_BY_FORM * of_best[&signal];
+            of_other[&signal] <= NEGLIGIBLE.max(alike.min(LEFT_BY_FORM * before))
+        })
+    }
+}
+
+/// The best hypothesis whose effects are no larger than they can be.
+fn possible(level: &[Judged]) -> Option<&Judged> {
+    level.iter().find(|judged| !judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters))
 }
 
 /// The hypotheses that are carried on: the best, and for each signal the one that leaves least of it, since of two effects

@@ -17,9 +17,9 @@ crate::variables::variables! {
     /// Thesis eqs. 4.5 and 4.17 (elastic term).
     pub struct BladderStiffness in "bladder_stiffness." as Tunable {
         /// Relative change of the elastic force
-        relative_change: f64 = 0.0, ONE, (-0.9..=3.0);
+        relative_change: f64 = 0.0, ONE, (-0.9..=1.0);
         /// Further relative change at 0.1 m of contraction
-        change_with_contraction: f64 = 0.0, ONE, (-2.0..=2.0);
+        change_with_contraction: f64 = 0.0, ONE, (-0.9..=0.9);
     }
 }
 

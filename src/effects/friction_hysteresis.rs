@@ -24,9 +24,9 @@ crate::variables::variables! {
     /// sign function replaced by h.
     pub struct FrictionHysteresis in "friction_hysteresis." as Tunable {
         /// Half width of the loop at zero pressure
-        half_width: f64 = 0.0, NEWTON, (0.0..=2000.0);
+        half_width: f64 = 0.0, NEWTON, (0.0..=300.0);
         /// Growth of the half width with gauge pressure
-        half_width_per_pressure: f64 = 0.0, SQUARE_METRE, (0.0..=0.02);
+        half_width_per_pressure: f64 = 0.0, SQUARE_METRE, (0.0..=1e-3);
         /// Displacement after a reversal at which most of the loop is passed
         presliding_displacement: f64 = 2e-3, METRE, (1e-5..=0.1);
         /// Share of the second element in the loop

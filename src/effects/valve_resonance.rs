@@ -12,7 +12,7 @@ crate::variables::variables! {
     /// The pressure rings after a step; its gain exceeds one near ω.
     ///
     /// # Validity
-    /// 15 to 100 rad/s and 0.3 to 0.8 are usual. Bandwidth and lag of the first-order valve mean nothing while it acts.
+    /// 15 to 100 rad/s and 0.3 to 0.8 are usual; beyond, nothing rings, and the valve is one with a lag. Bandwidth and lag of the first-order valve mean nothing while it acts.
     ///
     /// # Reference
     /// Second-order models of proportional valves, e.g. manufacturers' frequency responses; definition.
@@ -20,7 +20,7 @@ crate::variables::variables! {
         /// Natural frequency of the valve; zero where it is of first order
         natural_frequency: f64 = 0.0, RADIAN_PER_SECOND, (0.0..=500.0);
         /// Damping ratio
-        damping_ratio: f64 = 0.4, ONE, (0.02..=0.95);
+        damping_ratio: f64 = 0.4, ONE, (0.02..=0.8);
         /// Relative growth of the stiffness with errors far beyond 1 bar
         stiffening: f64 = 0.0, ONE, (-0.5..=2.0);
     }
@@ -39,8 +39,8 @@ impl Effect for ValveResonance {
         reference: "definition",
         of_load: false,
         forms: &[&[
-            ("valve_resonance.natural_frequency", &[20.0, 35.0]),
             ("valve_resonance.damping_ratio", &[0.3, 0.5]),
+            ("valve_resonance.natural_frequency", &[20.0, 35.0]),
         ]],
         refinements: &[("valve_resonance.stiffening", &[0.2])],
     };
