@@ -66,22 +66,46 @@ struct Preset {
     name: &'static str,
     description: &'static str,
     toml: &'static str,
+    /// The elastic modulus of the improved McKibben model as printed.
+    table_4_3: &'static str,
 }
 
 const PRESETS: &[Preset] = &[
-    Preset { name: "dmsp-40-1000", description: "FESTO DMSP-40, 1 m: coefficients of the thesis", toml: "" },
+    Preset {
+        name: "dmsp-40-1000",
+        description: "FESTO DMSP-40, 1 m: coefficients of the thesis",
+        toml: "",
+        table_4_3: include_str!("../presets/dmsp-40-1000-table-4.3.toml"),
+    },
     Preset {
         name: "dmsp-40-290",
         description: "FESTO DMSP-40, 29 cm: coefficients of the thesis",
         toml: include_str!("../presets/dmsp-40-290.toml"),
+        table_4_3: include_str!("../presets/dmsp-40-290-table-4.3.toml"),
     },
 ];
 
 /// The controller as the thesis prints it; a variant of every preset.
 const THESIS_CONTROLLER: &str = include_str!("../presets/thesis.toml");
 
-/// An ideal muscle holds a load only under pressure.
-const MCKIBBEN: &str = include_str!("../presets/mckibben.toml");
+/// A model without elastic force holds a load only under pressure.
+const UNDER_PRESSURE: &str = include_str!("../presets/under-pressure.toml");
+
+/// What a variant that is named after a force model changes beside `muscle.force_model`.
+fn beside_the_model(model: &str) -> &'static str {
+    match model {
+        "mckibben"
+        | "tondu-lopez"
+        | "tondu-lopez-k"
+        | "tondu-lopez-kq"
+        | "tondu-lopez-friction"
+        | "frustum-ends"
+        | "rounded-ends"
+        | "variable-diameter" => UNDER_PRESSURE,
+        "three-element" => include_str!("../presets/three-element.toml"),
+        _ => "",
+    }
+}
 
 /// Names of all presets and their variants, each with a line on what it is.
 pub fn presets() -> Vec<(String, String)> {
@@ -91,6 +115,9 @@ pub fn presets() -> Vec<(String, String)> {
         for model in ForceModelName::CHOICES {
             all.push((format!("{}/{}", preset.name, model.name), format!("force model: {}", model.description)));
         }
+        let printed =
+            "improved-mckibben with the elastic modulus as printed, which does not reproduce the thesis' forces";
+        all.push((format!("{}/table-4.3", preset.name), printed.to_owned()));
         all.push((format!("{}/thesis", preset.name), "controller with the printed gains and structure".to_owned()));
     }
     all
@@ -113,9 +140,10 @@ impl Parameters {
         for variant in parts {
             match variant {
                 "thesis" => parameters.apply_toml(THESIS_CONTROLLER, "thesis")?,
-                "mckibben" => parameters.apply_toml(MCKIBBEN, "mckibben")?,
+                "table-4.3" => parameters.apply_toml(base.table_4_3, "table-4.3")?,
                 model if ForceModelName::CHOICES.iter().any(|c| c.name == model) => {
                     parameters.set_text("muscle.force_model", model)?;
+                    parameters.apply_toml(beside_the_model(model), model)?;
                 }
                 _ => return Err(unknown()),
             }
@@ -287,7 +315,9 @@ mod tests {
             ("[load]\nmass = -3", "f.toml: `load.mass` is -3 kg, allowed is 0.001 to 100000 kg"),
             (
                 "[muscle]\nforce_model = \"x\"",
-                "f.toml: `muscle.force_model` takes one of virtual-area, improved-mckibben, mckibben, not `x`",
+                "f.toml: `muscle.force_model` takes one of virtual-area, improved-mckibben, mckibben, tondu-lopez, \
+                 tondu-lopez-k, tondu-lopez-kq, tondu-lopez-friction, frustum-ends, rounded-ends, variable-diameter, \
+                 mooney-rivlin, spring, three-element, not `x`",
             ),
             ("[load]\nmass = \"x\"", "f.toml: `load.mass` takes a number, not `x`"),
             ("[load]\nmass = true", "f.toml: `load.mass` takes a number or a name, not `boolean`"),

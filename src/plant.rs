@@ -3,7 +3,7 @@
 use crate::effects::{Effects, Point, Readings};
 use crate::memory::{Line, PlantMemory};
 use crate::model::{Documentation, Extended, Extent, Feedthrough, Passage, Step, System};
-use crate::muscle::bisect;
+use crate::muscle::{bisect, force_equations};
 use crate::parameters::Parameters;
 use crate::variables::Signals;
 use crate::{Error, GRAVITY, Result};
@@ -18,7 +18,7 @@ const LIMITS: &str = "Static force identified at 0.5 to 4.5 bar and 100 to 800 N
     The integration adapts its own step: results do not depend on the communication step for inputs that are held or \
     interpolated alike.";
 const SOURCE: &str = "Master thesis \u{201c}Comparative Assessment and Improvement of Pneumatic Artificial Muscles \
-    Modelling\u{201d}, Politecnico di Milano: eqs. 4.5 to 4.11, 4.17 (sign of b\u{b2} corrected), 5.3, 5.4.";
+    Modelling\u{201d}, Politecnico di Milano: chapters 3 and 4, with the corrections that the force models state, eqs. 5.3, 5.4.";
 
 /// Steps of the secant that finds the pull through what stretches, and the relative change of the pull that ends it.
 const MOST_SECANTS: usize = 20;
@@ -127,11 +127,12 @@ fn rigid_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
     let Parameters { muscle, force_models, effects, unknown_cause, .. } = parameters;
     let pressure = effects.effective_pressure(at, at.gauge_pressure);
     let contraction = effects.effective_contraction(at, own, at.contraction);
-    let of_pressure = force_models.pressure_force(muscle, pressure, contraction, at.contraction_velocity);
-    let of_area = effects.area_force(at, own, of_pressure);
+    let of_area = effects.area_force(at, own, force_models.pressure_force(muscle, pressure, contraction));
     let elastic = effects.elastic_force(at, own, force_models.elastic_force(muscle, contraction));
     let static_force = effects.static_force(of_area + elastic);
-    let force = effects.muscle_force(at, own, static_force - muscle.damping * at.contraction_velocity);
+    let velocity = at.contraction_velocity;
+    let resistance = force_models.resistance(muscle, pressure, contraction, velocity);
+    let force = effects.muscle_force(at, own, static_force - muscle.damping * velocity - resistance);
     unknown_cause.force(at, force)
 }
 
@@ -139,9 +140,8 @@ fn rigid_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
 #[inline]
 fn nominal_force(parameters: &Parameters, at: &Point) -> f64 {
     let Parameters { muscle, force_models, .. } = parameters;
-    force_models.pressure_force(muscle, at.gauge_pressure, at.contraction, at.contraction_velocity)
-        + force_models.elastic_force(muscle, at.contraction)
-        - muscle.damping * at.contraction_velocity
+    let velocity = at.contraction_velocity;
+    force_models.moving_force(muscle, at.gauge_pressure, at.contraction, velocity) - muscle.damping * velocity
 }
 
 /// Gauge pressure in Pa that a command in V asks for.
@@ -252,13 +252,15 @@ impl System for PneumaticMuscle {
     const NAME: &'static str = "PneumaticMuscle";
     const DESCRIPTION: &'static str = "Pneumatic artificial muscle with proportional valve and hanging load";
     const DOCUMENTATION: Documentation = Documentation {
-        equation: "valve   d(gauge_pressure)/dt = bandwidth (gain max(command, 0) - gauge_pressure)\n\
-                   muscle  force = F(gauge_pressure, contraction) - damping contraction_velocity\n\
-                   load    mass d(contraction_velocity)/dt = force - mass 9.81 m/s2 - external_force\n\n\
-                   F of muscle.force_model, with contraction x, length L = rest_length - x:\n\
-                   virtual-area       F = p (area_0 + area_1 x) + elastic_0 + elastic_1 x + elastic_2 x^2 + elastic_3 x^3\n\
-                   improved-mckibben  F = p (3 L^2 - b^2)/(4 pi n^2) + E(L/L0) (eps_L delta pi D - 2 eps_D delta L^2/(D n^2 pi^2))\n\n\
-                   At the start the load hangs still at initial.gauge_pressure.",
+        equation: concat!(
+            "valve   d(gauge_pressure)/dt = bandwidth (gain max(command, 0) - gauge_pressure)\n\
+             muscle  force = F(gauge_pressure, contraction) - damping contraction_velocity\n\
+             load    mass d(contraction_velocity)/dt = force - mass 9.81 m/s2 - external_force\n\n\
+             At the start the load hangs still at initial.gauge_pressure.\n\n\
+             F of muscle.force_model, with contraction x, its rate v, length L = rest_length - x, thread_length b and \
+             turns n:\n",
+            force_equations!(),
+        ),
         limits: LIMITS,
         source: SOURCE,
     };

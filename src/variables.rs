@@ -32,6 +32,7 @@ pub mod units {
         ONE = "1", "Ratio", 1.0, [0, 0, 0, 0, 0];
         METRE = "m", "Length", 0.1, [0, 1, 0, 0, 0];
         SQUARE_METRE = "m2", "Area", 1e-3, [0, 2, 0, 0, 0];
+        PER_METRE = "1/m", "Curvature", 1.0, [0, -1, 0, 0, 0];
         SECOND = "s", "Time", 1.0, [0, 0, 1, 0, 0];
         KILOGRAM = "kg", "Mass", 10.0, [1, 0, 0, 0, 0];
         METRE_PER_SECOND = "m/s", "Velocity", 0.1, [0, 1, -1, 0, 0];
@@ -41,9 +42,15 @@ pub mod units {
         NEWTON_PER_METRE2 = "N/m2", "StiffnessSlope", 1e5, [1, -1, -2, 0, 0];
         NEWTON_PER_METRE3 = "N/m3", "StiffnessCurvature", 1e6, [1, -2, -2, 0, 0];
         NEWTON_SECOND_PER_METRE = "N.s/m", "Damping", 100.0, [1, 0, -1, 0, 0];
+        METRE_SECOND = "m.s", "DampingSlope", 1e-4, [0, 1, 1, 0, 0];
         METRE_PER_NEWTON = "m/N", "Compliance", 1e-5, [-1, 0, 2, 0, 0];
         PASCAL = "Pa", "Pressure", 1e5, [1, -1, -2, 0, 0];
         PASCAL_PER_SECOND = "Pa/s", "PressureRate", 1e5, [1, -1, -3, 0, 0];
+        PER_PASCAL = "1/Pa", "PressureSlope", 1e-6, [-1, 1, 2, 0, 0];
+        METRE_PER_PASCAL = "m/Pa", "LengthSlope", 1e-6, [-1, 2, 2, 0, 0];
+        METRE_PER_PASCAL2 = "m/Pa2", "LengthCurvature", 1e-12, [-2, 3, 4, 0, 0];
+        NEWTON_PER_METRE2_PASCAL = "N/(m2.Pa)", "StiffnessSlopePerPressure", 1.0, [0, 0, 0, 0, 0];
+        NEWTON_PER_METRE_PASCAL2 = "N/(m.Pa2)", "StiffnessPerPressure2", 1e-7, [-1, 2, 2, 0, 0];
         PER_SECOND = "1/s", "Rate", 1.0, [0, 0, -1, 0, 0];
         PER_VOLT = "1/V", "GainSlope", 0.1, [-1, -2, 3, 1, 0];
         VOLT = "V", "Voltage", 1.0, [1, 2, -3, -1, 0];

@@ -70,37 +70,53 @@ impl Muscle {
     }
 }
 
-/// A static force model: F = F_p(p, x, v) + F_e(x), the pull of the pressure, and that of the membrane without pressure.
+/// A force model: F = F_p(p, x) + F_e(x) − R(p, x, v), the pull of the pressure, that of the membrane without pressure,
+/// and what resists motion.
 ///
-/// For most models the pressure works on an area that depends on the contraction alone, F_p = p A(x); these give A and
-/// F_e, and no more.
+/// In most models the pressure works on an area that depends on the contraction alone, F_p = p A(x), and nothing resists
+/// motion but `muscle.damping`: these give A and F_e, and no more.
 pub trait ForceModel {
-    /// Virtual area A = ∂F/∂p in m² of the resting muscle at a gauge pressure in Pa and a contraction in m: newtons gained
-    /// per pascal. Without elasticity it is −dV/dL.
+    /// Virtual area A = ∂F/∂p in m² at a gauge pressure in Pa and a contraction in m: newtons gained per pascal at rest.
+    /// Without elasticity it is −dV/dL.
     fn virtual_area(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64;
 
     /// Force in N without pressure at a contraction in m; negative where the membrane resists shortening.
     fn elastic_force(&self, muscle: &Muscle, contraction: f64) -> f64;
 
-    /// Pull in N of a gauge pressure in Pa at a contraction in m and its rate in m/s; none without pressure.
+    /// Pull in N of a gauge pressure in Pa at a contraction in m; none without pressure.
     #[inline]
-    fn pressure_force(
-        &self,
-        muscle: &Muscle,
-        gauge_pressure: f64,
-        contraction: f64,
-        _contraction_velocity: f64,
-    ) -> f64 {
+    fn pressure_force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
         gauge_pressure * self.virtual_area(muscle, gauge_pressure, contraction)
+    }
+
+    /// Force in N against a motion with a rate of the contraction in m/s, beside `muscle.damping`; none at rest.
+    #[inline]
+    fn resistance(&self, _muscle: &Muscle, _gauge_pressure: f64, _contraction: f64, _velocity: f64) -> f64 {
+        0.0
+    }
+
+    /// Pull in N with the muscle's corrections of area and elastic force.
+    #[inline]
+    fn force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64, velocity: f64) -> f64 {
+        muscle.area_correction(contraction) * self.pressure_force(muscle, gauge_pressure, contraction)
+            + muscle.elastic_correction(contraction) * self.elastic_force(muscle, contraction)
+            - self.resistance(muscle, gauge_pressure, contraction, velocity)
     }
 }
 
 macro_rules! force_models {
-    ($($Variant:ident($Model:ident, $field:ident) = $number:literal, $name:literal, $description:literal;)*) => {
+    ($($Variant:ident($Model:ident, $field:ident) = $number:literal, $name:literal, $description:literal,
+        $equation:literal;)*) => {
         $(
             mod $field;
             pub use $field::$Model;
         )*
+
+        /// The equation of every model, a line each; as a literal, for `concat!`.
+        macro_rules! force_equations {
+            () => { concat!($($name, "\n    ", $equation, "\n",)*) };
+        }
+        pub(crate) use force_equations;
 
         /// The choice of a static force model.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,13 +169,47 @@ macro_rules! force_models {
     };
 }
 
-// One line per model: adding a model is its file and a line here.
+// One entry per model: adding a model is its file and an entry here.
 force_models! {
     VirtualArea(VirtualArea, virtual_area) = 1, "virtual-area",
-        "pressure times a virtual area, plus an elastic force, both polynomials of the contraction (thesis eq. 4.5)";
+        "pressure times a virtual area, plus an elastic force, both polynomials of the contraction (thesis eq. 4.5)",
+        "p (area_0 + area_1 x + area_2 x^2 + area_3 x^3) + elastic_0 + elastic_1 x + elastic_2 x^2 + elastic_3 x^3";
     ImprovedMcKibben(ImprovedMcKibben, improved_mckibben) = 2, "improved-mckibben",
-        "McKibben braid with the elasticity of the membrane (thesis eq. 4.17, corrected)";
-    McKibben(McKibben, mckibben) = 3, "mckibben", "ideal McKibben braid, without any elasticity (thesis eq. 4.15, corrected)";
+        "McKibben braid with the elasticity of the membrane (thesis eq. 4.17, corrected)",
+        "p (3 L^2 - b^2)/(4 pi n^2) + E(L/L0) (eps_L delta pi D - 2 eps_D delta L^2/(D n^2 pi^2))";
+    McKibben(McKibben, mckibben) = 3, "mckibben",
+        "ideal McKibben braid, without any elasticity (thesis eq. 4.15, corrected)",
+        "p (3 L^2 - b^2)/(4 pi n^2)";
+    TonduLopez(TonduLopez, tondu_lopez) = 4, "tondu-lopez",
+        "ideal braid with two free coefficients in place of its angle (thesis eq. 4.16)",
+        "p pi/4 D0^2 (alpha (1 - x/L0)^2 - beta)";
+    TonduLopezK(TonduLopezK, tondu_lopez_k) = 5, "tondu-lopez-k",
+        "tondu-lopez, the contraction counted k times, k linear in pressure (thesis eq. 4.19)",
+        "p pi/4 D0^2 (alpha (1 - k x/L0)^2 - beta), k = k_0 + k_per_pressure p";
+    TonduLopezKq(TonduLopezKq, tondu_lopez_kq) = 6, "tondu-lopez-kq",
+        "tondu-lopez for low pressure, with k and a factor q known at two pressures (thesis eqs. 4.21 to 4.23)",
+        "p q pi/4 D0^2 (alpha (1 - k x/L0)^2 - beta), 1/k and q linear between low_pressure and high_pressure";
+    TonduLopezFriction(TonduLopezFriction, tondu_lopez_friction) = 7, "tondu-lopez-friction",
+        "tondu-lopez-k with dry friction between the threads (thesis eq. 4.20)",
+        "tondu-lopez-k - friction pi D0 L0 sin(theta_0)/(r sqrt(1 - cos(theta_0)^2 r^2)) p tanh(v/smoothing_velocity), r = 1 - k x/L0";
+    FrustumEnds(FrustumEnds, frustum_ends) = 8, "frustum-ends",
+        "ideal braid between two cones (thesis eqs. 3.13 to 3.15)",
+        "-p dV/dL, L = L_m + 2 sqrt(end_length^2 - (D - end_diameter)^2/4), D of a braid of length L_m";
+    RoundedEnds(RoundedEnds, rounded_ends) = 9, "rounded-ends",
+        "ideal braid with caps of a sphere at its ends (thesis eqs. 3.16 to 3.19)",
+        "p ((3 L^2 - b^2)/(4 pi n^2) + M), M = d(V_v - V_a)/dL of the ends";
+    VariableDiameter(VariableDiameter, variable_diameter) = 10, "variable-diameter",
+        "barrel with parabolic staves (thesis eqs. 3.21 to 3.23)",
+        "-p dV/dL, V = L (3 d^2 pi^2 n^2 + 4 d pi n c + 8 c^2)/(60 pi n^2), c^2 = b^2 - L^2, d = end_diameter";
+    MooneyRivlin(MooneyRivlin, mooney_rivlin) = 11, "mooney-rivlin",
+        "McKibben braid around a bladder of Mooney-Rivlin rubber (thesis eqs. 3.24 to 3.31, corrected)",
+        "p (3 L^2 - b^2)/(4 pi n^2) + pi D0 L0 delta d(c10 (I1 - 3) + c01 (I2 - 3))/dL";
+    Spring(Spring, spring) = 12, "spring",
+        "spring whose stiffness depends on pressure and stretch, in two ranges of pressure (thesis eqs. 4.12 and 4.13)",
+        "K s, K = c0 + c1 s^2 + c2 p s + c3 p^2, s = u0 + u1 p + u2 p^2 - x, mixed from blend_start to blend_end";
+    ThreeElement(ThreeElement, three_element) = 13, "three-element",
+        "contractile element, spring and damper in parallel (thesis eq. 3.47)",
+        "contraction_force + contraction_area p - (stiffness + stiffness_per_pressure p) x - B(p) v";
 }
 
 /// Gauge pressure in Pa up to which [`ForceModels::holding_pressure`] looks for one that holds.
@@ -175,16 +225,9 @@ impl ForceModels {
 
     /// Pull in N of the pressure in the chosen model, with the muscle's correction.
     #[inline]
-    pub fn pressure_force(
-        &self,
-        muscle: &Muscle,
-        gauge_pressure: f64,
-        contraction: f64,
-        contraction_velocity: f64,
-    ) -> f64 {
-        let model = self.chosen(muscle.force_model);
-        muscle.area_correction(contraction)
-            * model.pressure_force(muscle, gauge_pressure, contraction, contraction_velocity)
+    pub fn pressure_force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
+        let force = self.chosen(muscle.force_model).pressure_force(muscle, gauge_pressure, contraction);
+        muscle.area_correction(contraction) * force
     }
 
     /// Elastic force in N of the chosen model, with the muscle's correction.
@@ -193,10 +236,22 @@ impl ForceModels {
         muscle.elastic_correction(contraction) * self.chosen(muscle.force_model).elastic_force(muscle, contraction)
     }
 
+    /// Force in N with which the chosen model resists a motion, beside `muscle.damping`.
+    #[inline]
+    pub fn resistance(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64, velocity: f64) -> f64 {
+        self.chosen(muscle.force_model).resistance(muscle, gauge_pressure, contraction, velocity)
+    }
+
+    /// Pull in N of the chosen model in motion, without `muscle.damping`.
+    #[inline]
+    pub fn moving_force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64, velocity: f64) -> f64 {
+        self.chosen(muscle.force_model).force(muscle, gauge_pressure, contraction, velocity)
+    }
+
     /// Pull in N of the chosen model at rest.
     #[inline]
     pub fn force(&self, muscle: &Muscle, gauge_pressure: f64, contraction: f64) -> f64 {
-        self.pressure_force(muscle, gauge_pressure, contraction, 0.0) + self.elastic_force(muscle, contraction)
+        self.moving_force(muscle, gauge_pressure, contraction, 0.0)
     }
 
     /// Gauge pressure in Pa at which the resting muscle pulls with a force in N at a contraction in m: the lowest below
