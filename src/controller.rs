@@ -71,6 +71,9 @@ crate::variables::variables! {
     /// the controller, T_f, so that jumps of the acceleration are followed as fast as that. Shares: `elastic` k_e, `gravity` k_g, `inertia` k_a,
     /// `damping` k_d, `valve_lag` k_v.
     ///
+    /// # Validity
+    /// What the pull of the pressure depends on velocity, in models in which it does, is left to the feedback.
+    ///
     /// # Reference
     /// Thesis section 5.3 has k_e = k_g = 1 and the others 0. It names the elastic forces only, but its gains could not
     /// carry the weight over the stroke. Inertia, damping and the inversion of the valve are additions.

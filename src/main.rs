@@ -90,8 +90,8 @@ enum Command {
     #[command(after_help = "Example:\n  sinew closed-loop --out docs")]
     ClosedLoop {
         /// Number of random plants
-        #[arg(long, default_value_t = 1000)]
-        plants: usize,
+        #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+        plants: u32,
         /// Folder for closed-loop.md and its figures
         #[arg(long, default_value = "sinew-closed-loop")]
         out: PathBuf,
@@ -406,9 +406,9 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
     Ok(Answer { text, json })
 }
 
-fn evaluate_closed_loop(plants: usize, out: &Path) -> Result<Answer> {
+fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
     let bar = progress(closed_loop::pieces());
-    let evaluation = closed_loop::evaluate(plants, &|name| {
+    let evaluation = closed_loop::evaluate(plants as usize, &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;

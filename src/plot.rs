@@ -73,8 +73,9 @@ fn draw(svg: &mut String, panels: &[Panel]) -> Drawn {
         let chart =
             chart.caption(panel.title, ("sans-serif", 17)).margin(10).x_label_area_size(38).y_label_area_size(62);
         if panel.logarithmic {
-            let (low, high) = finite_range(all().flat_map(|c| c.x.iter().copied()));
-            draw_panel(chart.build_cartesian_2d((low..high).log_scale(), y)?, panel)?;
+            let (low, high) = finite_range(all().flat_map(|c| c.x.iter().copied()).filter(|x| *x > 0.0));
+            let range = if low < high { low..high } else { 0.1..10.0 };
+            draw_panel(chart.build_cartesian_2d(range.log_scale(), y)?, panel)?;
         } else {
             draw_panel(chart.build_cartesian_2d(x, y)?, panel)?;
         }

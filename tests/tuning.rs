@@ -136,7 +136,10 @@ fn margins_are_where_the_loop_becomes_unstable() {
             let stable = |plant: &LinearPlant, factor: f64| {
                 closed_loop_poles(plant, controller, factor).iter().all(|pole| pole.re < 0.0)
             };
-            assert!(stable(&plant, 0.99 * margins.gain) && !stable(&plant, 1.01 * margins.gain), "{point:?} {margins:?}");
+            assert!(
+                stable(&plant, 0.99 * margins.gain) && !stable(&plant, 1.01 * margins.gain),
+                "{point:?} {margins:?}"
+            );
             // Beyond that the dead time is longer than Padé of second order describes.
             if margins.delay * margins.peak_frequency < 1.0 {
                 let late = |share: f64| plant.delayed(share * margins.delay);

@@ -213,7 +213,7 @@ fn extremes(margins: &[PointMargins]) -> Vec<minijinja::Value> {
             sensitivity => format!("{peak:.2}"),
         }
     };
-    vec![row("as known", |m| &m.known), row("not quite known", |m| &m.uncertain)]
+    vec![row("as known", |m| &m.known), row("not quite known, that with the largest peak", |m| &m.uncertain)]
 }
 
 fn point_words(point: &OperatingPoint) -> String {

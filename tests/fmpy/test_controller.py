@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from muscles import GRAVITY, VIRTUAL_AREA_290, VIRTUAL_AREA_1000
-from support import Fmu, Instance, run
+from support import ROOT, Fmu, Instance, run
 
 INPUTS = ("setpoint", "setpoint_velocity", "setpoint_acceleration", "measured_contraction")
 MASS, PRESSURE, BANDWIDTH, VALVE_GAIN, DAMPING = 40.0, 1.4e5, 2 * np.pi * 2.5, 1e5, 80.0
@@ -176,3 +176,15 @@ def test_tuned_parameters_export_the_tuned_controller(sinew, tmp_path):
 def test_loads_that_are_no_loads_are_wrong_usage(sinew, tmp_path):
     with pytest.raises(AssertionError, match="gave 2"):
         run(sinew, "tune", "--load-mass", "-3", "--out", tmp_path)
+
+
+def test_page_of_the_closed_loop_is_fresh(sinew, tmp_path, note):
+    """All of the committed page but what follows from the number of random plants."""
+    answer = json.loads(run(sinew, "closed-loop", "--plants", "18", "--out", tmp_path, "--json").stdout)
+    made, committed = (folder.joinpath("closed-loop.md").read_text() for folder in (tmp_path, ROOT / "docs"))
+    assert made.split("\n## On 18 random")[0] == committed.split("\n## On 1000 random")[0]
+    for controller in answer["known"]:
+        errors = [1e3 * case["largest_error"] for case in controller["cases"]]
+        assert len(errors) == 18
+        note(f"closed loop, {controller['controller']}: worst error {max(errors):.2f} mm")
+    assert all(plant["outcomes"]["tuned"]["held"] == 18 for plant in answer["unknown"])
