@@ -11,7 +11,7 @@ from support import ROOT, Fmu, Instance, run
 INPUTS = ("setpoint", "setpoint_velocity", "setpoint_acceleration", "measured_contraction")
 MASS, PRESSURE, BANDWIDTH, VALVE_GAIN, DAMPING = 40.0, 1.4e5, 2 * np.pi * 2.5, 1e5, 80.0
 GAINS = {"proportional_gain": 0.4, "integral_gain": 21.0, "derivative_gain": 0.3, "filter_time_constant": 0.02,
-         "maximum_command": 1.9}
+         "maximum_command": 1.5}
 
 
 def inputs_at(time):
@@ -24,9 +24,10 @@ def feed_forward(setpoint, velocity, acceleration, jerk):
     def pressure(time):
         x = setpoint + velocity * time
         pull = MASS * (GRAVITY + acceleration + jerk * time) + DAMPING * (velocity + acceleration * time)
-        return (pull - VIRTUAL_AREA_1000.elastic_force(x)) / VIRTUAL_AREA_1000.area(x)
+        wanted = (pull - VIRTUAL_AREA_1000.elastic_force(x)) / VIRTUAL_AREA_1000.area(x)
+        return min(max(wanted, 0.0), VALVE_GAIN * GAINS["maximum_command"])
 
-    rate = pressure(1e-20j).imag / 1e-20  # complex step
+    rate = (pressure(1e-4) - pressure(-1e-4)) / 2e-4
     return (pressure(0.0) + rate / BANDWIDTH) / VALVE_GAIN
 
 
@@ -131,10 +132,13 @@ def polynomials(muscle, mass, x, gains, filter_time):
 
 
 def largest_factor(numerator, denominator):
-    """Gain margin by bisection on the roots of the characteristic polynomial."""
-    stable = lambda factor: np.roots(np.polyadd(denominator, factor * numerator)).real.max() < 0.0  # noqa: E731
-    low, high = 1.0, 1e3
-    assert stable(low) and not stable(high)
+    """Gain margin: the smallest factor above one at which a root of the characteristic polynomial is unstable."""
+    def stable(factor):
+        return np.roots(np.polyadd(denominator, factor * numerator)).real.max() < 0.0
+
+    factors = np.geomspace(1.0, 1e3, 3000)
+    first = next(k for k, factor in enumerate(factors) if not stable(factor))
+    low, high = factors[first - 1:first + 1]
     while high / low > 1.0 + 1e-9:
         middle = np.sqrt(low * high)
         low, high = (middle, high) if stable(middle) else (low, middle)
