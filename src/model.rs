@@ -209,6 +209,10 @@ pub trait System: Copy + Send + 'static {
         state: &Self::State,
         memory: &Self::Memory,
     ) -> Self::Outputs;
+    /// Whether an output keeps its value until it jumps, so that its time derivative is zero.
+    fn is_held(_parameters: &Parameters, _output: &str) -> bool {
+        false
+    }
     /// Name of a state that has left the range in which the model means anything.
     fn left_range(parameters: &Parameters, state: &Self::State) -> Option<&'static str>;
 
@@ -597,6 +601,9 @@ impl<S: Registered> Model for Simulator<S> {
     }
 
     fn output_derivative(&self, position: usize) -> f64 {
+        if S::is_held(&self.parameters, S::interface().variables[position].name) {
+            return 0.0;
+        }
         let output = position - S::interface().inputs;
         if let Some(rates) = S::output_rates(&self.parameters, self.time) {
             return rates.get(output);

@@ -308,10 +308,19 @@ pub fn at_rest_on_reference(parameters: &Parameters) -> Parameters {
 /// # Errors
 /// As [`replay`].
 pub fn closed_loop(parameters: &Parameters, step: f64, duration: f64) -> Result<ClosedLoop> {
-    let parameters = at_rest_on_reference(parameters);
-    let mut reference = Simulator::<ReferenceTrajectory>::new(parameters);
-    let mut controller = Simulator::<PidFeedForward>::new(parameters);
-    let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
+    closed_loop_on(parameters, parameters, step, duration)
+}
+
+/// As [`closed_loop`], with a plant of which the controller knows the parameters `known` and the pressure at which it starts.
+///
+/// # Errors
+/// As [`replay`].
+pub fn closed_loop_on(plant: &Parameters, known: &Parameters, step: f64, duration: f64) -> Result<ClosedLoop> {
+    let (plant, mut known) = (at_rest_on_reference(plant), *known);
+    known.initial = plant.initial;
+    let mut reference = Simulator::<ReferenceTrajectory>::new(known);
+    let mut controller = Simulator::<PidFeedForward>::new(known);
+    let mut muscle = Simulator::<PneumaticMuscle>::new(plant);
     reference.initialize(0.0)?;
     muscle.initialize(0.0)?;
     let mut course = ClosedLoop::default();
@@ -325,6 +334,9 @@ pub fn closed_loop(parameters: &Parameters, step: f64, duration: f64) -> Result<
         controller.inputs.measured_contraction = is.measured_contraction;
         if k == 0 {
             controller.initialize(0.0)?;
+            // Anew, so that a valve that is late has had the first command before the start as well.
+            muscle.inputs.command = plant.initial.gauge_pressure / plant.valve.gain;
+            muscle.initialize(0.0)?;
         }
         let control = controller.outputs();
         course.time.push(muscle.time());
