@@ -160,7 +160,7 @@ fn what_cannot_be_tuned_is_said() {
 
 #[test]
 fn the_tuned_loop_meets_the_bar_in_all_18_cases() {
-    let outcomes = outcomes(|muscle| Parameters::preset(muscle), &Unknown::default()).unwrap();
+    let outcomes = outcomes(Parameters::preset, &Unknown::default()).unwrap();
     let worst = outcomes.iter().map(|outcome| outcome.largest_error).fold(0.0, f64::max);
     println!("worst error {:.3} mm", 1e3 * worst);
     assert!(worst < 0.5e-3 && outcomes.iter().all(|outcome| outcome.holds()));
@@ -170,7 +170,7 @@ fn the_tuned_loop_meets_the_bar_in_all_18_cases() {
 fn the_tuned_loop_holds_on_plants_that_it_does_not_know() {
     let together = unknown_plants().into_iter().filter(|(name, _)| name.starts_with("all together"));
     for (name, unknown) in together {
-        for outcome in outcomes(|muscle| Parameters::preset(muscle), &unknown).unwrap() {
+        for outcome in outcomes(Parameters::preset, &unknown).unwrap() {
             assert!(outcome.left < SETTLED && outcome.swing < LIMIT_CYCLE, "{name}: {outcome:?}");
         }
     }
@@ -194,7 +194,7 @@ fn same_input_same_bytes() {
     let parameters = preset("dmsp-40-1000");
     let made = |tuning: &Tuning| files(tuning, &parameters, "dmsp-40-1000", Path::new("out"));
     assert_eq!(made(&TUNINGS[0]), made(&tune(&parameters, &LOADS).unwrap()));
-    let random = || random_plants(6, |muscle| Parameters::preset(muscle)).unwrap();
+    let random = || random_plants(6, Parameters::preset).unwrap();
     assert_eq!(random(), random());
 }
 

@@ -117,7 +117,7 @@ impl Outcome {
         let judged: Vec<f64> = errors().filter(|(time, _)| **time > end - REST.1).map(|(_, error)| *error).collect();
         let highest = judged.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let lowest = judged.iter().copied().fold(f64::INFINITY, f64::min);
-        let last = errors().filter(|(_, error)| error.abs() > SETTLED).map(|(time, _)| *time).last();
+        let last = errors().filter(|(_, error)| error.abs() > SETTLED).map(|(time, _)| *time).next_back();
         Self {
             largest_error: course.largest_error(),
             left: highest.abs().max(lowest.abs()),

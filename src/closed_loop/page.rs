@@ -246,7 +246,8 @@ fn random_section(evaluation: &Evaluation) -> String {
         held(tuned),
         held(printed)
     );
-    let quantities: [(&str, fn(&Outcome) -> f64); 3] =
+    type Quantity = fn(&Outcome) -> f64;
+    let quantities: [(&str, Quantity); 3] =
         [("largest error", |o| o.largest_error), ("error left", |o| o.left), ("swing", |o| o.swing)];
     for (controller, outcomes) in [("tuned", tuned), ("printed", printed)] {
         for (name, quantity) in quantities {

@@ -59,7 +59,9 @@ pub fn assess_all(models: &[ForceModelName], given: &Parameters, points: &Points
         models.iter().flat_map(|model| braids.iter().map(|braid| (*model, *braid))).collect();
     // What fits nothing of the braid is the same either way, and judged once.
     let worth = |(model, braid): &(ForceModelName, Braid)| {
-        *braid == Braid::Given || !braids.contains(&Braid::Given) || Structure::of(*model, *braid, given, &points.all).fits_braid()
+        *braid == Braid::Given
+            || !braids.contains(&Braid::Given)
+            || Structure::of(*model, *braid, given, &points.all).fits_braid()
     };
     let mut assessed: Vec<Assessed> = all
         .into_par_iter()

@@ -202,7 +202,7 @@ impl Sampled {
 /// [`Error::Tuning`] where the muscle holds no position, or no gains satisfy the bound.
 pub fn tune(parameters: &Parameters, masses: &[f64]) -> Result<Tuning> {
     let points = operating_points(parameters, masses);
-    let soft = points.iter().find(|point| !(point.plant(parameters).natural_frequency() > 0.0));
+    let soft = points.iter().find(|point| point.plant(parameters).natural_frequency().max(0.0) == 0.0);
     if let Some(OperatingPoint { mass, contraction }) = soft {
         let problem = format!(
             "the muscle holds no position with {mass} kg at a contraction of {contraction:.3} m; try other loads"
