@@ -55,10 +55,12 @@ enum Command {
         out: PathBuf,
     },
     /// Fit a force model to recordings
-    #[command(after_help = "Examples:\n  sinew identify isotonic.csv --model improved-mckibben --parameters my-muscle.toml --out identified\n  \
+    #[command(
+        after_help = "Examples:\n  sinew identify isotonic.csv --model improved-mckibben --parameters my-muscle.toml --out identified\n  \
         sinew export --parameters identified/parameters.toml --out fmus\n\n\
         --parameters gives the geometry (muscle.rest_length above all) and where the fit starts. Without --model it is the one \
-        with the smallest error on points that were left out.")]
+        with the smallest error on points that were left out."
+    )]
     Identify {
         #[command(flatten)]
         recordings: RecordingSource,

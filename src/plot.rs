@@ -69,7 +69,9 @@ fn draw(svg: &mut String, title: &str, x_label: &str, y_label: &str, dots: &[Cur
         let color = PALETTE[curve.color % PALETTE.len()];
         let drawn = chart.draw_series(LineSeries::new(points(curve), color.stroke_width(1)))?;
         if !curve.label.is_empty() {
-            drawn.label(curve.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(3)));
+            drawn
+                .label(curve.label)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(3)));
         }
     }
     if labelled > 1 {

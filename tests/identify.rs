@@ -108,7 +108,8 @@ fn outliers_are_named_and_do_little_harm() {
     let truth = Parameters::default();
     let mut normal = noise(7);
     let points = grid(&truth);
-    let exact = forces(&Parameters { muscle: sinew::muscle::Muscle { damping: 0.0, ..truth.muscle }, ..truth }, &points);
+    let exact =
+        forces(&Parameters { muscle: sinew::muscle::Muscle { damping: 0.0, ..truth.muscle }, ..truth }, &points);
     for (k, (point, force)) in points.iter().zip(exact).enumerate() {
         let wrong = if k % 29 == 5 { 2000.0 } else { 0.0 };
         let (x, p) = (1e3 * point.contraction, point.gauge_pressure / 1e5);
@@ -167,9 +168,13 @@ fn plateaus_are_found_and_motion_is_said() {
 
 #[test]
 fn a_load_alone_tells_the_force() {
-    let found =
-        identify(&recording("nominal_40kg.csv"), &Parameters::default(), Some(ForceModelName::VirtualArea), Braid::Given)
-            .unwrap();
+    let found = identify(
+        &recording("nominal_40kg.csv"),
+        &Parameters::default(),
+        Some(ForceModelName::VirtualArea),
+        Braid::Given,
+    )
+    .unwrap();
     assert!(found.found.errors.relative < 0.02, "{:?}", found.found.errors);
     let damping = found.parameters.get("muscle.damping").unwrap();
     assert!((60.0..100.0).contains(&damping), "{damping}");

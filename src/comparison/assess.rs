@@ -65,15 +65,15 @@ impl Assessed {
     pub fn of(model: ForceModelName, braid: Braid, given: &Parameters, points: &[Point]) -> Self {
         let structure = Structure::of(model, braid, given, points);
         let fitted = fit(&structure, points, Start::Wide);
-        let held_out = blocks(points).into_iter().filter_map(|(name, all)| held_out(name, &all, &fitted, points)).collect();
+        let held_out =
+            blocks(points).into_iter().filter_map(|(name, all)| held_out(name, &all, &fitted, points)).collect();
         Self::described(fitted, held_out, points)
     }
 
     fn described(fitted: Fitted, held_out: Vec<HeldOut>, points: &[Point]) -> Self {
         let at = |k: usize| (fitted.residuals[k], points[k].force);
-        let some = |chosen: &dyn Fn(&Point) -> bool| {
-            Errors::of((0..points.len()).filter(|&k| chosen(&points[k])).map(at))
-        };
+        let some =
+            |chosen: &dyn Fn(&Point) -> bool| Errors::of((0..points.len()).filter(|&k| chosen(&points[k])).map(at));
         let by = |of: fn(&Point) -> f64| {
             let of_class = |class: Class| {
                 let errors = Errors::of(class.members.iter().map(|&k| at(k)))?;

@@ -66,9 +66,13 @@ fn percent(share: f64) -> String {
 }
 
 fn fails(muscle: &OnMuscle, full: f64) -> Option<Claim> {
-    let (plain, fitted) = (given(muscle, "mckibben")?, muscle.models.iter().find(|a| {
-        model_name(a.fitted.structure.model) == "mckibben" && a.fitted.structure.fits_braid()
-    }));
+    let (plain, fitted) = (
+        given(muscle, "mckibben")?,
+        muscle
+            .models
+            .iter()
+            .find(|a| model_name(a.fitted.structure.model) == "mckibben" && a.fitted.structure.fits_braid()),
+    );
     let [rms, share] = [plain.errors.rms, plain.errors.rms / full];
     let fitted = fitted.map_or(String::new(), |a| {
         format!("; with the braid fitted {:.0} N, {}", a.errors.rms, percent(a.errors.rms / full))
@@ -92,7 +96,10 @@ fn repairs(muscle: &OnMuscle) -> Option<Claim> {
         verdict: verdict(share < REPAIRS),
         because: format!(
             "With the braid as given, the elasticity of the membrane leaves {:.0} N of {:.0} N rms, {}; below {} counts as repaired.",
-            elastic.errors.rms, plain.errors.rms, percent(share), percent(REPAIRS)
+            elastic.errors.rms,
+            plain.errors.rms,
+            percent(share),
+            percent(REPAIRS)
         ),
     })
 }
@@ -110,7 +117,10 @@ fn low_pressure(muscle: &OnMuscle) -> Option<Claim> {
         because: format!(
             "improved-mckibben misses {} of the force at {} points below 1 bar and {} at {} points above; {BAD:.0} times as much \
              counts as bad.",
-            percent(low.relative), low.points, percent(high.relative), high.points
+            percent(low.relative),
+            low.points,
+            percent(high.relative),
+            high.points
         ),
     })
 }
@@ -125,7 +135,8 @@ fn empirical(muscle: &OnMuscle) -> Option<Claim> {
         verdict: verdict(empirical.held_out_rms() < other.held_out_rms()),
         because: format!(
             "On points that the fits did not see, the best empirical model is {}, the best of the others {}.",
-            told(empirical), told(other)
+            told(empirical),
+            told(other)
         ),
     })
 }
@@ -141,7 +152,11 @@ pub fn keeps_a_sign(cross: &[Cross], one: &str, other: &str, transfer: Transfer)
     let told = |c: &Cross| {
         format!(
             "parameters of {} on {}: {:.0} N rms against {:.0} N with its own, too low at {:.0} % of the points",
-            c.of, c.on, c.errors.rms, c.own_rms, 100.0 * c.too_low
+            c.of,
+            c.on,
+            c.errors.rms,
+            c.own_rms,
+            100.0 * c.too_low
         )
     };
     let how = if transfer == Transfer::Normalised { "normalised" } else { "as they are" };
@@ -150,7 +165,9 @@ pub fn keeps_a_sign(cross: &[Cross], one: &str, other: &str, transfer: Transfer)
         verdict: verdict(one_sided(there) && one_sided(back) && opposite),
         because: format!(
             "improved-mckibben, {how}: {}; {}. At least {:.0} % on one side counts as a sign.",
-            told(there), told(back), 100.0 * SIGN
+            told(there),
+            told(back),
+            100.0 * SIGN
         ),
     })
 }

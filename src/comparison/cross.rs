@@ -49,7 +49,10 @@ pub fn between(muscles: &[OnMuscle]) -> Vec<Cross> {
         for on in muscles.iter().filter(|on| on.name != of.name) {
             for model in of.models.iter().filter(|model| model.fitted.structure.braid == Braid::Given) {
                 let name = model.fitted.structure.model;
-                let own = on.models.iter().find(|m| m.fitted.structure.model == name && m.fitted.structure.braid == Braid::Given);
+                let own = on
+                    .models
+                    .iter()
+                    .find(|m| m.fitted.structure.model == name && m.fitted.structure.braid == Braid::Given);
                 let Some(own) = own else { continue };
                 for transfer in [Transfer::AsTheyAre, Transfer::Normalised] {
                     let modelled = taken_over(&model.fitted.parameters, name, &on.given, &on.points.all, transfer);

@@ -1,11 +1,12 @@
 //! Force models compared on measured muscles: the assessment of the thesis, on anybody's data.
 //!
 //! [`errors`] and [`assess`] judge one model, [`cross`] takes its parameters to another muscle, [`isometric`] makes curves at
-//! fixed length, [`claims`] says whether what the thesis claims holds, and [`report`] shows it all.
+//! fixed length, [`dynamic`] sets motion against rest, [`claims`] says whether what the thesis claims holds, and [`report`] shows it all.
 
 pub mod assess;
 pub mod claims;
 pub mod cross;
+pub mod dynamic;
 pub mod errors;
 pub mod isometric;
 pub mod report;
@@ -59,7 +60,9 @@ pub fn assess_all(models: &[ForceModelName], given: &Parameters, points: &Points
         models.iter().flat_map(|model| braids.iter().map(|braid| (*model, *braid))).collect();
     // What fits nothing of the braid is the same either way, and judged once.
     let worth = |(model, braid): &(ForceModelName, Braid)| {
-        *braid == Braid::Given || !braids.contains(&Braid::Given) || Structure::of(*model, *braid, given, &points.all).fits_braid()
+        *braid == Braid::Given
+            || !braids.contains(&Braid::Given)
+            || Structure::of(*model, *braid, given, &points.all).fits_braid()
     };
     let mut assessed: Vec<Assessed> = all
         .into_par_iter()

@@ -56,10 +56,14 @@ pub fn to_json(found: &Comparison) -> Value {
 fn of_model(model: &Assessed, effective: f64) -> Value {
     let fitted = &model.fitted;
     let criteria = model.criteria(effective);
-    let values = fitted.structure.free.iter().zip(&fitted.values).zip(&fitted.half_widths).map(|((free, value), half)| {
-        let (low, high) = (half.map(|half| value - half), half.map(|half| value + half));
-        (free.variable.name.to_owned(), json!({ "value": value, "low": low, "high": high, "unit": free.variable.unit.symbol }))
-    });
+    let values =
+        fitted.structure.free.iter().zip(&fitted.values).zip(&fitted.half_widths).map(|((free, value), half)| {
+            let (low, high) = (half.map(|half| value - half), half.map(|half| value + half));
+            (
+                free.variable.name.to_owned(),
+                json!({ "value": value, "low": low, "high": high, "unit": free.variable.unit.symbol }),
+            )
+        });
     json!({
         "model": model_name(fitted.structure.model), "label": fitted.structure.label(), "braid": fitted.structure.braid,
         "errors": model.errors, "r_squared": model.determination, "below_1_bar": model.low, "from_1_bar": model.high,
@@ -97,7 +101,8 @@ fn cells(model: &Assessed, full: f64, effective: f64, best: Option<f64>) -> Vec<
     let percent = |errors: Option<super::errors::Errors>| {
         errors.map_or("–".to_owned(), |errors| format!("{:.1}", 100.0 * errors.relative))
     };
-    let criterion = model.criteria(effective).zip(best).map_or("–".to_owned(), |(c, best)| format!("{:.0}", c[0] - best));
+    let criterion =
+        model.criteria(effective).zip(best).map_or("–".to_owned(), |(c, best)| format!("{:.0}", c[0] - best));
     let held_out = |model: &Assessed, wanted: fn(&str) -> bool| {
         model.held_out.iter().find(|held| wanted(held.blocks)).map_or("–".to_owned(), |held| newton(held.rms))
     };
@@ -117,8 +122,17 @@ fn cells(model: &Assessed, full: f64, effective: f64, best: Option<f64>) -> Vec<
 }
 
 const HEADER: [&str; 11] = [
-    "model", "fitted", "rms [N]", "of full scale [%]", "max [N]", "relative [%]", "below 1 bar [%]", "from 1 bar [%]",
-    "pressures held out, rms [N]", "loads or contractions held out, rms [N]", "ΔAICc",
+    "model",
+    "fitted",
+    "rms [N]",
+    "of full scale [%]",
+    "max [N]",
+    "relative [%]",
+    "below 1 bar [%]",
+    "from 1 bar [%]",
+    "pressures held out, rms [N]",
+    "loads or contractions held out, rms [N]",
+    "ΔAICc",
 ];
 
 fn rows(muscle: &OnMuscle) -> Vec<Vec<String>> {
@@ -185,19 +199,27 @@ fn capital(word: &str) -> String {
 fn write_table(text: &mut String, header: &[&str], rows: &[Vec<String>]) {
     let _ = writeln!(text, "| {} |", header.join(" | "));
     let _ = writeln!(text, "|---|{}", "---:|".repeat(header.len() - 1));
-    rows.iter().for_each(|row| { let _ = writeln!(text, "| {} |", row.join(" | ")); });
+    rows.iter().for_each(|row| {
+        let _ = writeln!(text, "| {} |", row.join(" | "));
+    });
     text.push('\n');
 }
 
-const CROSS_HEADER: [&str; 7] = ["model", "parameters of", "on", "taken over", "rms [N]", "own rms [N]", "too low at [% of points]"];
+const CROSS_HEADER: [&str; 7] =
+    ["model", "parameters of", "on", "taken over", "rms [N]", "own rms [N]", "too low at [% of points]"];
 
 fn cross_rows(found: &Comparison) -> Vec<Vec<String>> {
     let row = |cross: &Cross| {
         let how = if cross.transfer == Transfer::Normalised { "normalised" } else { "as they are" };
         let newton = |value: f64| if value.is_finite() { format!("{value:.1}") } else { "–".to_owned() };
         vec![
-            cross.model.to_owned(), cross.of.clone(), cross.on.clone(), how.to_owned(), newton(cross.errors.rms),
-            newton(cross.own_rms), format!("{:.0}", 100.0 * cross.too_low),
+            cross.model.to_owned(),
+            cross.of.clone(),
+            cross.on.clone(),
+            how.to_owned(),
+            newton(cross.errors.rms),
+            newton(cross.own_rms),
+            format!("{:.0}", 100.0 * cross.too_low),
         ]
     };
     found.cross.iter().map(row).collect()
@@ -239,7 +261,8 @@ pub fn html(found: &Comparison) -> String {
 }
 
 fn shown(claims: Vec<Claim>) -> Vec<minijinja::Value> {
-    let one = |claim: Claim| context! { claim => claim.claim, verdict => word(claim.verdict), because => claim.because };
+    let one =
+        |claim: Claim| context! { claim => claim.claim, verdict => word(claim.verdict), because => claim.because };
     claims.into_iter().map(one).collect()
 }
 
@@ -248,7 +271,11 @@ fn class_rows(muscle: &OnMuscle, of: fn(&Assessed) -> &Vec<ClassErrors>, size: f
     let Some(first) = muscle.models.first() else { return Vec::new() };
     let row = |k: usize, class: &ClassErrors| {
         let [low, high] = class.class.span.map(|value| value / size);
-        let name = if high - low > 0.02 * high.abs() { format!("{low:.4} … {high:.4}") } else { format!("{:.4}", class.class.value / size) };
+        let name = if high - low > 0.02 * high.abs() {
+            format!("{low:.4} … {high:.4}")
+        } else {
+            format!("{:.4}", class.class.value / size)
+        };
         let mut cells = vec![trimmed(&name), class.errors.points.to_string()];
         cells.extend(muscle.models.iter().take(5).map(|model| format!("{:.1}", of(model)[k].errors.rms)));
         cells
@@ -259,7 +286,13 @@ fn class_rows(muscle: &OnMuscle, of: fn(&Assessed) -> &Vec<ClassErrors>, size: f
 /// Numbers without zeros that say nothing.
 fn trimmed(text: &str) -> String {
     text.split(' ')
-        .map(|part| if part.contains('.') { part.trim_end_matches('0').trim_end_matches('.').to_owned() } else { part.to_owned() })
+        .map(|part| {
+            if part.contains('.') {
+                part.trim_end_matches('0').trim_end_matches('.').to_owned()
+            } else {
+                part.to_owned()
+            }
+        })
         .collect::<Vec<_>>()
         .join(" ")
 }

@@ -131,7 +131,7 @@ impl Problem<'_> {
                 }
                 let away = 2.0 * halton(start, [2, 3, 5, 7, 11, 13][k % 6]) - 1.0;
                 // Within a factor of three, and every other one within ten.
-                let factor = if start % 2 == 0 { 3_f64 } else { 10.0 };
+                let factor = if start.is_multiple_of(2) { 3_f64 } else { 10.0 };
                 let value = if p.given == 0.0 { away * p.typical() } else { p.given * factor.powf(away) };
                 value.clamp(p.bounds[0], p.bounds[1])
             };
@@ -224,8 +224,7 @@ impl Problem<'_> {
             values[k] - low <= near || high - values[k] <= near
         };
         let moving: Vec<usize> = (0..count).filter(|&k| !at_bound(k)).collect();
-        let columns: Vec<Vec<f64>> =
-            moving.iter().map(|&k| structure.derivative(&values, k, self.points)).collect();
+        let columns: Vec<Vec<f64>> = moving.iter().map(|&k| structure.derivative(&values, k, self.points)).collect();
         let lengths: Vec<f64> = columns.iter().map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt()).collect();
         let jacobian = DMatrix::from_fn(self.points.len(), moving.len(), |row, k| {
             weights[row].sqrt() * columns[k][row] / lengths[k].max(f64::MIN_POSITIVE)
@@ -265,7 +264,17 @@ impl Problem<'_> {
         let parameters = structure.at(&values);
         let scale = robust_scale(&residuals);
         Fitted {
-            structure, parameters, values, half_widths, residuals, weights, scale, effective, singular_values, weak, ended,
+            structure,
+            parameters,
+            values,
+            half_widths,
+            residuals,
+            weights,
+            scale,
+            effective,
+            singular_values,
+            weak,
+            ended,
         }
     }
 }

@@ -74,7 +74,8 @@ fn able_to_start(found: &Parameters, mass: Option<f64>, points: &[Point], notes:
     let highest = points.iter().map(|point| point.gauge_pressure).fold(0.0, f64::max);
     let masses = [mass, Some(found.load.mass), Some(median(&forces) / GRAVITY), Some(0.2 * median(&forces) / GRAVITY)];
     for mass in masses.into_iter().flatten().filter(|mass| *mass > 1e-3) {
-        let pressures = std::iter::once(found.initial.gauge_pressure).chain((1..=20).map(|k| highest * f64::from(k) / 20.0));
+        let pressures =
+            std::iter::once(found.initial.gauge_pressure).chain((1..=20).map(|k| highest * f64::from(k) / 20.0));
         for pressure in pressures {
             if equilibrium(found, pressure, mass * GRAVITY).is_some() {
                 let mut parameters = *found;
@@ -91,6 +92,8 @@ fn able_to_start(found: &Parameters, mass: Option<f64>, points: &[Point], notes:
             }
         }
     }
-    notes.push("no load was found that hangs still from the muscle: set `load.mass` and `initial.gauge_pressure`".to_owned());
+    notes.push(
+        "no load was found that hangs still from the muscle: set `load.mass` and `initial.gauge_pressure`".to_owned(),
+    );
     *found
 }

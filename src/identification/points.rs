@@ -182,7 +182,8 @@ impl<'a> Columns<'a> {
 
     fn resting(&self, recording: usize) -> (Source, Vec<Point>) {
         if self.rows_stand_for_themselves() {
-            let whole = |k: &usize| ![self.pressure[*k], self.contraction[*k], self.force(*k)].iter().any(|v| v.is_nan());
+            let whole =
+                |k: &usize| ![self.pressure[*k], self.contraction[*k], self.force(*k)].iter().any(|v| v.is_nan());
             let point = |k: usize| Point {
                 recording,
                 line: self.recording.line(k),
@@ -319,7 +320,8 @@ fn distinct(points: &[Point]) -> usize {
         0.02 * range(&values).max(f64::MIN_POSITIVE)
     };
     let (pressure, contraction) = (of(|p| p.gauge_pressure), of(|p| p.contraction));
-    let cell = |p: &Point| [(p.gauge_pressure / pressure).round(), (p.contraction / contraction).round()].map(f64::to_bits);
+    let cell =
+        |p: &Point| [(p.gauge_pressure / pressure).round(), (p.contraction / contraction).round()].map(f64::to_bits);
     points.iter().map(cell).collect::<std::collections::HashSet<_>>().len()
 }
 

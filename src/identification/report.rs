@@ -41,13 +41,26 @@ pub fn sentences(found: &Identification) -> Vec<String> {
         fitted.effective
     )];
     for held in &all.held_out {
-        said.push(format!("{:.1} N rms on points that the fit did not see, every inner {} left out once.", held.rms, held.blocks));
+        said.push(format!(
+            "{:.1} N rms on points that the fit did not see, every inner {} left out once.",
+            held.rms, held.blocks
+        ));
     }
     if let Some((_, best)) = found.rivals.first() {
-        let next = found.rivals.get(1).map_or(String::new(), |(label, rms)| format!("; next is {label} with {rms:.1} N"));
-        said.push(format!("It is the model of {} with the smallest held-out error, {best:.1} N{next}.", found.rivals.len()));
+        let next =
+            found.rivals.get(1).map_or(String::new(), |(label, rms)| format!("; next is {label} with {rms:.1} N"));
+        said.push(format!(
+            "It is the model of {} with the smallest held-out error, {best:.1} N{next}.",
+            found.rivals.len()
+        ));
     }
-    said.extend(fitted.structure.held.iter().map(|held| format!("`{}` is held at {:?}: {}.", held.name, held.value, held.reason)));
+    said.extend(
+        fitted
+            .structure
+            .held
+            .iter()
+            .map(|held| format!("`{}` is held at {:?}: {}.", held.name, held.value, held.reason)),
+    );
     for k in at_bounds(found) {
         let parameter = &fitted.structure.free[k];
         said.push(format!("`{}` stopped at its bound {:?}: no interval.", parameter.variable.name, fitted.values[k]));
@@ -55,7 +68,8 @@ pub fn sentences(found: &Identification) -> Vec<String> {
     for direction in &fitted.weak {
         let names: Vec<&str> = direction.iter().map(|(k, _)| fitted.structure.free[*k].variable.name).collect();
         let names = names.join(", ");
-        let sentence = format!("The points hardly tell {names} apart: use them together, and look at no single one of them.");
+        let sentence =
+            format!("The points hardly tell {names} apart: use them together, and look at no single one of them.");
         if !said.contains(&sentence) {
             said.push(sentence);
         }
@@ -63,7 +77,10 @@ pub fn sentences(found: &Identification) -> Vec<String> {
     let far = outliers(found);
     let share = far.len() as f64 / errors.points as f64;
     if share > MANY {
-        said.push(format!("{:.0} % of the points lie far off: the model misses them, they are no outliers.", 100.0 * share));
+        said.push(format!(
+            "{:.0} % of the points lie far off: the model misses them, they are no outliers.",
+            100.0 * share
+        ));
     } else {
         let named = |k: &usize| place(found, *k);
         let list: Vec<String> = far.iter().take(5).map(named).collect();
@@ -99,7 +116,9 @@ fn at_bounds(found: &Identification) -> Vec<usize> {
 pub fn to_toml(found: &Identification) -> String {
     let fitted = &found.found.fitted;
     let mut text = format!("# Identified from {}.\n", found.recordings.join(", "));
-    sentences(found).iter().for_each(|line| { let _ = writeln!(text, "# {line}"); });
+    sentences(found).iter().for_each(|line| {
+        let _ = writeln!(text, "# {line}");
+    });
     let _ = writeln!(text, "# Intervals hold 95 %.\n");
     let mut group = String::new();
     for line in found.parameters.to_toml().lines() {
@@ -179,13 +198,16 @@ fn plots(found: &Identification) -> Vec<(String, String)> {
     let (bars, millimetres) = (over(pressure, 1e5), over(contraction, 1e-3));
     let dots = |x: &[f64]| {
         let split = |branch: Branch| -> (Vec<f64>, Vec<f64>) {
-            let of = (0..points.len()).filter(|&k| (points[k].branch == Branch::Lengthening) == (branch == Branch::Lengthening));
+            let of = (0..points.len())
+                .filter(|&k| (points[k].branch == Branch::Lengthening) == (branch == Branch::Lengthening));
             of.map(|k| (x[k], residuals[k])).unzip()
         };
         (split(Branch::Shortening), split(Branch::Lengthening))
     };
     let mut all = Vec::new();
-    for (name, axis, x) in [("pressure", "gauge pressure [bar]", &bars), ("contraction", "contraction [mm]", &millimetres)] {
+    for (name, axis, x) in
+        [("pressure", "gauge pressure [bar]", &bars), ("contraction", "contraction [mm]", &millimetres)]
+    {
         let ((up_x, up), (down_x, down)) = dots(x);
         let curves = [
             Curve { label: "shortening", x: &up_x, y: &up, color: 1 },
