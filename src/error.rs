@@ -144,6 +144,12 @@ pub enum Error {
         /// Why not and what to do.
         problem: String,
     },
+    /// A controller that cannot be tuned.
+    #[error("{problem}")]
+    Tuning {
+        /// Why not and what to do.
+        problem: String,
+    },
     /// A file that cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {

@@ -24,6 +24,8 @@ pub mod reference;
 pub mod valve;
 
 #[cfg(feature = "tool")]
+pub mod closed_loop;
+#[cfg(feature = "tool")]
 pub mod comparison;
 #[cfg(feature = "tool")]
 pub mod demo;
@@ -47,6 +49,8 @@ pub mod quality;
 pub mod simulation;
 #[cfg(feature = "tool")]
 pub mod ssp;
+#[cfg(feature = "tool")]
+pub mod tuning;
 
 pub use error::{Error, Result};
 

@@ -14,7 +14,7 @@ use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
 use sinew::simulation::{OUTPUTS, replay, rms_difference};
-use sinew::{Result, demo, export, package};
+use sinew::{Result, closed_loop, demo, export, package, tuning};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -123,6 +123,29 @@ enum Command {
         plan.csv holds the command to play; diagnose what you record with it together with the recordings there are.\n\
         Without a diagnosis, the recording is planned that tells all effects apart as well as one can.")]
     Plan(PlanArguments),
+    /// Choose the gains of the controller for a range of loads, and say how robust they are
+    #[command(after_help = "Examples:\n  sinew tune --parameters dmsp-40-290 --load-mass 20,40,80 --out tuned\n  \
+        sinew export --parameters tuned/parameters.toml")]
+    Tune {
+        #[command(flatten)]
+        parameters: ParameterSource,
+        /// Loads that the controller must hold, kg
+        #[arg(long, value_delimiter = ',', default_value = "20,40,80", value_parser = |text: &str| quantity(text, Signal::LoadMass))]
+        load_mass: Vec<f64>,
+        /// Folder for parameters.toml, tuning.json and report.html
+        #[arg(long, default_value = "sinew-tuning")]
+        out: PathBuf,
+    },
+    /// Simulate the closed loops of the thesis, on known, unknown and random plants
+    #[command(after_help = "Example:\n  sinew closed-loop --out docs")]
+    ClosedLoop {
+        /// Number of random plants
+        #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+        plants: u32,
+        /// Folder for closed-loop.md and its figures
+        #[arg(long, default_value = "sinew-closed-loop")]
+        out: PathBuf,
+    },
     /// Do it all once, on recordings that ship with the program
     #[command(after_help = "Example:\n  sinew demo --out sinew-demo")]
     Demo {
@@ -321,6 +344,8 @@ fn run(command: Command) -> Result<Answer> {
             run_diagnosis(&parameters.load()?, &recordings.read()?, tolerance, &out)
         }
         Command::Plan(arguments) => run_plan(&arguments),
+        Command::Tune { parameters, load_mass, out } => tune(&parameters, load_mass, &out),
+        Command::ClosedLoop { plants, out } => evaluate_closed_loop(plants, &out),
         Command::Demo { out } => run_demo(&out),
         Command::List { what } => Ok(list(what)),
     }
@@ -473,6 +498,49 @@ fn planned(found: &Plan) -> String {
     let all = plan::matrix(found);
     text += &format!("\nlambda of the best (from {:.0} on a pair is told apart):\n{all}", plan::ENOUGH);
     text
+}
+
+fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<Answer> {
+    masses.sort_by(f64::total_cmp);
+    masses.dedup();
+    let parameters = source.load()?;
+    let tuning = tuning::tune(&parameters, &masses)?;
+    let files = export::write_whole(tuning::files(&tuning, &parameters, &source.source, out))?;
+    let mut json = tuning::to_json(&tuning);
+    json["files"] = json!(files);
+    let controller = &tuning.parameters.controller;
+    let worst = tuning.worst();
+    let least =
+        |value: fn(&tuning::PointMargins) -> f64| tuning.margins.iter().map(value).fold(f64::INFINITY, f64::min);
+    let text = format!(
+        "proportional {:.4} V/m, integral {:.4} V/(m s), derivative {:.4} V s/m\n\
+         gain margin {:.2}, phase margin {:.0}°, dead time margin {:.0} ms; sensitivity peak {:.2} on plants that are not quite known,\n\
+         at its worst with {} kg at {:.0} mm\n\n{}",
+        controller.proportional_gain,
+        controller.integral_gain,
+        controller.derivative_gain,
+        least(|m| m.known.gain),
+        least(|m| m.known.phase).to_degrees(),
+        1e3 * least(|m| m.known.delay),
+        worst.uncertain.sensitivity,
+        worst.point.mass,
+        1e3 * worst.point.contraction,
+        listed(&files)
+    );
+    Ok(Answer { text, json })
+}
+
+fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
+    let bar = progress(closed_loop::pieces());
+    let evaluation = closed_loop::evaluate(plants as usize, &|name| {
+        bar.set_message(name.to_owned());
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let files = export::write_whole(closed_loop::files(&evaluation, out))?;
+    let mut json = closed_loop::to_json(&evaluation);
+    json["files"] = json!(files);
+    Ok(Answer { text: listed(&files), json })
 }
 
 fn run_demo(out: &Path) -> Result<Answer> {

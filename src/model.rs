@@ -209,9 +209,18 @@ pub trait System: Copy + Send + 'static {
         state: &Self::State,
         memory: &Self::Memory,
     ) -> Self::Outputs;
+    /// Whether an output keeps its value until it jumps, so that its time derivative is zero.
+    fn is_held(_parameters: &Parameters, _output: &str) -> bool {
+        false
+    }
     /// Name of a state that has left the range in which the model means anything.
     fn left_range(parameters: &Parameters, state: &Self::State) -> Option<&'static str>;
 
+    /// Derivatives of the outputs at a time in s, per second, of a system that is a function of time with jumps, which
+    /// no difference may straddle; `None` where differences serve.
+    fn output_rates(_parameters: &Parameters, _time: f64) -> Option<Self::Outputs> {
+        None
+    }
     /// What is at work.
     fn extent(_parameters: &Parameters) -> Extent {
         Extent::Nominal
@@ -592,9 +601,15 @@ impl<S: Registered> Model for Simulator<S> {
     }
 
     fn output_derivative(&self, position: usize) -> f64 {
+        if S::is_held(&self.parameters, S::interface().variables[position].name) {
+            return 0.0;
+        }
+        let output = position - S::interface().inputs;
+        if let Some(rates) = S::output_rates(&self.parameters, self.time) {
+            return rates.get(output);
+        }
         let span = 1e-5;
         let (after, before) = (self.outputs_near(span), self.outputs_near(-span));
-        let output = position - S::interface().inputs;
         (after.get(output) - before.get(output)) / (2.0 * span)
     }
 

@@ -1,6 +1,6 @@
 //! All parameters in one place: their defaults, presets, and the TOML file that people edit.
 
-use crate::controller::{Controller, FeedForward};
+use crate::controller::{Controller, FeedForward, Sampling};
 use crate::correction::UnknownCause;
 use crate::effects::Effects;
 use crate::load::{Initial, Load};
@@ -41,6 +41,8 @@ groups! {
     initial: Initial,
     /// PID controller.
     controller: Controller,
+    /// When the controller acts.
+    sampling: Sampling,
     /// Feed-forward of the controller.
     feed_forward: FeedForward,
     /// Reference trajectory.

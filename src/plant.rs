@@ -146,14 +146,14 @@ fn nominal_force(parameters: &Parameters, at: &Point) -> f64 {
 
 /// Gauge pressure in Pa that a command in V asks for.
 #[inline]
-fn commanded_pressure(parameters: &Parameters, command: f64) -> f64 {
-    parameters.valve.target_pressure(parameters.effects.command(command))
+fn commanded_pressure(parameters: &Parameters, command: f64, at: &Point, own: &[f64]) -> f64 {
+    parameters.valve.target_pressure(parameters.effects.command(at, own, command))
 }
 
 /// The point with the pressure that the valve goes for.
 #[inline]
 fn with_target(parameters: &Parameters, command: f64, at: Point, own: &[f64]) -> Point {
-    let commanded_pressure = commanded_pressure(parameters, command);
+    let commanded_pressure = commanded_pressure(parameters, command, &at, own);
     let at = Point { commanded_pressure, ..at };
     let target_pressure = parameters.effects.target_pressure(&at, own, commanded_pressure);
     Point { target_pressure: parameters.unknown_cause.target_pressure(&at, target_pressure), ..at }
@@ -191,12 +191,12 @@ pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) 
     let mut still = *parameters;
     still.effects.valve_resonance = Default::default();
     still.effects.valve_lag.second_time_constant = 0.0;
-    let own = [0.0; Effects::STATES];
+    let own = still.effects.start(&at_rest(0.0, contraction));
     let rate = |pressure: f64| {
         let at = with_target(&still, command, at_rest(pressure, contraction), &own);
         pressure_rate(&still, &at, &own)
     };
-    let highest = 1e5 + commanded_pressure(&still, command);
+    let highest = 1e5 + commanded_pressure(&still, command, &at_rest(0.0, contraction), &own);
     if rate(0.0) <= 0.0 { 0.0 } else { bisect(rate, 0.0, highest) }
 }
 
@@ -382,7 +382,7 @@ fn readings(parameters: &Parameters, time: f64, at: &Point, force: f64, memory: 
     let effects = &parameters.effects;
     let remembered = memory.contraction_at(time - effects.contraction_delay());
     let contraction = remembered.unwrap_or(at.contraction);
-    effects.readings(Readings { contraction, gauge_pressure: at.gauge_pressure, force })
+    effects.readings(Readings { time, contraction, gauge_pressure: at.gauge_pressure, force })
 }
 
 /// Whether the memory is empty and stays so. An effect that has become neutral is forgotten.

@@ -114,6 +114,14 @@ impl System for ReferenceTrajectory {
     fn outputs(parameters: &Parameters, time: f64, _: &NoInputs, _: &[f64; 0], (): &()) -> Setpoint {
         parameters.reference.at(time)
     }
+    fn output_rates(parameters: &Parameters, time: f64) -> Option<Setpoint> {
+        let Setpoint { setpoint_velocity, setpoint_acceleration, .. } = parameters.reference.at(time);
+        Some(Setpoint {
+            setpoint: setpoint_velocity,
+            setpoint_velocity: setpoint_acceleration,
+            setpoint_acceleration: 0.0,
+        })
+    }
     fn left_range(_: &Parameters, _: &[f64; 0]) -> Option<&'static str> {
         None
     }

@@ -77,7 +77,10 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
 pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
     let nothing = || vec![0.0; recording.time.len()];
     let mut pressure = recording.bridged(Signal::GaugePressure).unwrap_or_else(nothing);
-    pressure.iter_mut().for_each(|reading| *reading = parameters.effects.true_pressure(*reading));
+    let start = recording.time[0];
+    for (reading, time) in pressure.iter_mut().zip(&recording.time) {
+        *reading = parameters.effects.true_pressure(*reading, time - start);
+    }
     let motion = Motion::of(parameters, recording);
     let inputs = |k: usize, pull: f64| MeasuredInputs {
         gauge_pressure: pressure[k],
@@ -93,11 +96,11 @@ fn initial_pressure(parameters: &Parameters, recording: &Recording, command: f64
     match recording.bridged(Signal::GaugePressure) {
         Some(readings) => {
             let first = mean(&readings[..START_SAMPLES.min(readings.len())]);
-            parameters.effects.true_pressure(first).max(0.0)
+            parameters.effects.true_pressure(first, 0.0).max(0.0)
         }
         None => {
             let contraction = recording.bridged(Signal::Contraction).map_or(0.0, |readings| readings[0]);
-            steady_pressure(parameters, command, parameters.effects.true_contraction(contraction, 0.0))
+            steady_pressure(parameters, command, parameters.effects.true_contraction(contraction, 0.0, 0.0))
         }
     }
 }
@@ -107,6 +110,8 @@ struct Motion<'a> {
     parameters: &'a Parameters,
     /// Readings without their delay, m.
     readings: Vec<f64>,
+    /// When they were taken, s since the start.
+    time: Vec<f64>,
     /// Velocity in m/s; the rate at which something in series stretches is neglected.
     velocity: Vec<f64>,
 }
@@ -119,19 +124,20 @@ impl<'a> Motion<'a> {
         if delay > 0.0 {
             readings = ahead(time, &readings, delay);
         }
-        let unstretched: Vec<f64> =
-            readings.iter().map(|reading| parameters.effects.true_contraction(*reading, 0.0)).collect();
-        Self { parameters, velocity: slopes(time, &unstretched), readings }
+        let since: Vec<f64> = time.iter().map(|now| now - time[0]).collect();
+        let unstretched = |(reading, time): (&f64, &f64)| parameters.effects.true_contraction(*reading, 0.0, *time);
+        let unstretched: Vec<f64> = readings.iter().zip(&since).map(unstretched).collect();
+        Self { parameters, velocity: slopes(time, &unstretched), readings, time: since }
     }
 
     /// Contraction in m at a sample, while the muscle pulls with a force in N.
     fn contraction(&self, sample: usize, pull: f64) -> f64 {
-        self.parameters.effects.true_contraction(self.readings[sample], pull)
+        self.parameters.effects.true_contraction(self.readings[sample], pull, self.time[sample])
     }
 
     /// What tells the pull of the muscle, where the contraction behind a reading depends on it.
     fn pull(&self) -> Option<fn(&ActuatorOutputs) -> f64> {
-        let stretches = |pull: f64| self.parameters.effects.true_contraction(0.0, pull);
+        let stretches = |pull: f64| self.parameters.effects.true_contraction(0.0, pull, 0.0);
         (stretches(0.0) != stretches(100.0)).then_some(|out| out.force)
     }
 }
@@ -169,11 +175,12 @@ fn follow<S: System>(
 ) -> Result<Replay> {
     let mut simulator = Simulator::<S>::new(*parameters);
     simulator.inputs = inputs(0, 0.0);
-    simulator.initialize(time[0])?;
+    // What settles counts from the start of the recording.
+    simulator.initialize(0.0)?;
     let mut force = 0.0;
     if let Some(pull) = pull {
         force = balance(&mut simulator, |force| inputs(0, force), pull, force);
-        simulator.initialize(time[0])?;
+        simulator.initialize(0.0)?;
     }
     let mut replay = Replay { given: given.to_vec(), ..Replay::default() };
     for k in 0..time.len() {
@@ -301,10 +308,19 @@ pub fn at_rest_on_reference(parameters: &Parameters) -> Parameters {
 /// # Errors
 /// As [`replay`].
 pub fn closed_loop(parameters: &Parameters, step: f64, duration: f64) -> Result<ClosedLoop> {
-    let parameters = at_rest_on_reference(parameters);
-    let mut reference = Simulator::<ReferenceTrajectory>::new(parameters);
-    let mut controller = Simulator::<PidFeedForward>::new(parameters);
-    let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
+    closed_loop_on(parameters, parameters, step, duration)
+}
+
+/// As [`closed_loop`], with a plant of which the controller knows the parameters `known` and the pressure at which it starts.
+///
+/// # Errors
+/// As [`replay`].
+pub fn closed_loop_on(plant: &Parameters, known: &Parameters, step: f64, duration: f64) -> Result<ClosedLoop> {
+    let (plant, mut known) = (at_rest_on_reference(plant), *known);
+    known.initial = plant.initial;
+    let mut reference = Simulator::<ReferenceTrajectory>::new(known);
+    let mut controller = Simulator::<PidFeedForward>::new(known);
+    let mut muscle = Simulator::<PneumaticMuscle>::new(plant);
     reference.initialize(0.0)?;
     muscle.initialize(0.0)?;
     let mut course = ClosedLoop::default();
@@ -318,6 +334,9 @@ pub fn closed_loop(parameters: &Parameters, step: f64, duration: f64) -> Result<
         controller.inputs.measured_contraction = is.measured_contraction;
         if k == 0 {
             controller.initialize(0.0)?;
+            // Anew, so that a valve that is late has had the first command before the start as well.
+            muscle.inputs.command = plant.initial.gauge_pressure / plant.valve.gain;
+            muscle.initialize(0.0)?;
         }
         let control = controller.outputs();
         course.time.push(muscle.time());

@@ -358,8 +358,8 @@ impl<'a> Bench<'a> {
 
     /// The parameters of a fit with their 95 % intervals: those of the effects, then the corrections.
     ///
-    /// The scatter of the estimate comes from how large the residuals of each signal are and how long they hang together,
-    /// noise or not (sandwich, H. White 1982, doi 10.2307/1912526).
+    /// The scatter of the estimate comes from how much blocks of a few seconds pull it apart, noise or not (sandwich with
+    /// clusters: H. White 1982, doi 10.2307/1912526; K.-Y. Liang and S. Zeger 1986, doi 10.1093/biomet/73.1.13).
     pub fn intervals(&self, fitted: &Fitted, scope: Scope) -> (Vec<FittedParameter>, Vec<FittedParameter>) {
         let (variables, free) = self.everything_free(&fitted.hypothesis, &fitted.parameters);
         let at: Vec<f64> = free.iter().map(|f| f.start).collect();
@@ -378,6 +378,21 @@ impl<'a> Bench<'a> {
         (found, corrections)
     }
 
+    /// Sum over blocks of the squared gradients that each of them contributes, enlarged for how few they are.
+    fn gradients(&self, columns: &[Vec<f64>], residuals: &[f64]) -> DMatrix<f64> {
+        let blocks = self.data.blocks();
+        let count = blocks.iter().max().map_or(0, |last| last + 1);
+        let mut gradients = DMatrix::<f64>::zeros(columns.len(), count);
+        for (k, column) in columns.iter().enumerate() {
+            for ((slope, residual), block) in column.iter().zip(residuals).zip(&blocks) {
+                gradients[(k, *block)] += slope * residual;
+            }
+        }
+        let seen = gradients.column_iter().filter(|gradient| gradient.iter().any(|g| *g != 0.0)).count() as f64;
+        let free = (seen - columns.len() as f64).max(1.0);
+        &gradients * gradients.transpose() * (seen / free)
+    }
+
     /// Information of the fit, and variance of its gradient.
     fn normal_matrices(
         &self,
@@ -387,17 +402,12 @@ impl<'a> Bench<'a> {
         scope: Scope,
     ) -> (DMatrix<f64>, DMatrix<f64>) {
         let weights = self.data.weights(scope);
-        let scaled = |factors: &[f64]| -> Vec<Vec<f64>> {
-            let both = columns.iter().zip(free);
-            both.map(|(column, free)| {
-                column.iter().zip(factors).map(|(slope, factor)| slope * factor * free.typical).collect()
-            })
-            .collect()
+        let scaled = |(column, free): (&Vec<f64>, &Free)| -> Vec<f64> {
+            column.iter().zip(&weights).map(|(slope, weight)| slope * weight * free.typical).collect()
         };
-        let mut bread = normal_matrix(&scaled(&weights));
-        let spread = self.data.spread(&fitted.residuals, scope);
-        let inflated: Vec<f64> = weights.iter().zip(&spread).map(|(weight, spread)| weight * weight * spread).collect();
-        let mut filling = normal_matrix(&scaled(&inflated));
+        let columns: Vec<Vec<f64>> = columns.iter().zip(free).map(scaled).collect();
+        let mut bread = normal_matrix(&columns);
+        let mut filling = self.gradients(&columns, &weighted(&fitted.residuals, &weights));
         for (k, free) in free.iter().enumerate() {
             let prior = free.prior.map_or(0.0, |(_, deviation)| (free.typical / deviation).powi(2));
             // The small constant keeps a parameter without influence from spoiling the others.

@@ -218,9 +218,13 @@ impl<'a> Chain<'a> {
         let effects = &self.parameters.effects;
         let needed = parabolas(&self.recording.time, &contraction).zip(&contraction).map(|(motion, contraction)| {
             let force = effects.mass(mass) * (GRAVITY + motion.curvature);
-            effects.readings(Readings { contraction: *contraction, gauge_pressure: 0.0, force }).force
+            (contraction, force)
         });
-        Some(difference(&smoothed(&self.recording.time, force), &needed.collect::<Vec<_>>()))
+        let time = self.since_start();
+        let shown = needed.zip(&time).map(|((contraction, force), time)| {
+            effects.readings(Readings { time: *time, contraction: *contraction, gauge_pressure: 0.0, force }).force
+        });
+        Some(difference(&smoothed(&self.recording.time, force), &shown.collect::<Vec<_>>()))
     }
 
     fn reading(&self) -> Option<Vec<f64>> {
@@ -240,8 +244,15 @@ impl<'a> Chain<'a> {
     fn true_contraction(&self) -> Option<Vec<f64>> {
         let readings = self.recording.bridged(Signal::Contraction)?;
         let pull = self.recording.bridged(Signal::Force).unwrap_or_else(|| vec![0.0; readings.len()]);
-        let both = readings.into_iter().zip(pull);
-        Some(both.map(|(reading, pull)| self.parameters.effects.true_contraction(reading, pull)).collect())
+        let all = readings.into_iter().zip(pull).zip(self.since_start());
+        let effects = &self.parameters.effects;
+        Some(all.map(|((reading, pull), time)| effects.true_contraction(reading, pull, time)).collect())
+    }
+
+    /// Times of the samples in s since the start.
+    fn since_start(&self) -> Vec<f64> {
+        let time = &self.recording.time;
+        time.iter().map(|now| now - time[0]).collect()
     }
 }
 

@@ -245,22 +245,20 @@ impl<'a> Data<'a> {
         self.recordings
     }
 
-    /// Per residual, the root of the variance that counts when many of them are added up: their size and how long they
-    /// hang together.
-    pub fn spread(&self, residuals: &[f64], scope: Scope) -> Vec<f64> {
-        let mut losses = self.losses(residuals, scope).into_iter().peekable();
-        let mut spread = Vec::with_capacity(residuals.len());
-        for segment in &self.segments {
-            let noise = self.noise[&segment.signal];
-            let seen = segment.samples.iter().any(|&k| self.is_in(scope, segment, k));
-            let own = losses.next_if(|loss| seen && loss.signal == segment.signal);
-            let size = own.map_or(0.0, |loss| {
-                let inflation = (loss.samples as f64 / loss.effective).max(noise.inflation);
-                noise.level * (loss.excess * inflation).sqrt()
-            });
-            spread.extend(segment.samples.iter().map(|_| size));
+    /// Per residual, the number of its block: blocks of a few seconds of a recording, all signals together.
+    pub fn blocks(&self) -> Vec<usize> {
+        let mut first = 0;
+        let mut numbers = Vec::with_capacity(self.recordings.len());
+        for recording in self.recordings {
+            let start = recording.time[0];
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let of_recording: Vec<usize> =
+                recording.time.iter().map(|time| first + ((time - start) / BLOCK) as usize).collect();
+            first = of_recording.last().map_or(first, |last| last + 1);
+            numbers.push(of_recording);
         }
-        spread
+        let of = |segment: &Segment| segment.samples.iter().map(|&k| numbers[segment.recording][k]).collect::<Vec<_>>();
+        self.segments.iter().flat_map(of).collect()
     }
 
     /// Rms of each signal's residual on the samples that no fit saw, SI.

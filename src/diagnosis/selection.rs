@@ -19,12 +19,14 @@ const LEAST_EXPLAINED: (f64, f64) = (0.95, 0.8);
 const LEAST_FURTHER: f64 = 0.8;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
-/// Share of a signal's error that a named effect may leave without a further effect being looked for: a seventh of its
+/// Share of a signal's error that a named effect may leave without a further effect being looked for: a tenth of its
 /// rms is how the form of an effect differs from the true one.
-const LEFT_BY_FORM: f64 = 0.02;
+const LEFT_BY_FORM: f64 = 0.01;
 /// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
 /// in the forms, which are never known exactly.
 const ALSO_BY_FORM: f64 = 3.0;
+/// Share of the error that a hypothesis must explain before its refinement, to become a rival of one that leaves nothing.
+const MAY_RIVAL: f64 = 0.8;
 /// How many times the structural error of a sound model an error must be to be called unexplained.
 const UNEXPLAINED: f64 = 6.5;
 /// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
@@ -32,9 +34,10 @@ const BEAM: usize = 3;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
 /// Candidates that are fitted, of those that look promising: for the first effect, and for further ones.
-const FITTED: (usize, usize) = (10, 7);
-/// Starts from which a candidate is fitted.
+const FITTED: (usize, usize) = (6, 5);
+/// Starts from which a candidate is fitted, and the share of the first one's promise that a further one must have.
 const STARTS: usize = 2;
+const ALSO_PROMISING: f64 = 0.5;
 
 /// A hypothesis with what speaks for it.
 #[derive(Clone)]
@@ -176,7 +179,8 @@ impl<'a, 'b> Search<'a, 'b> {
         starts.sort_by(|a, b| b[0].promise.total_cmp(&a[0].promise));
         starts.truncate(most);
         let best = |starts: Vec<Start>| {
-            let fits = starts.iter().take(STARTS).filter_map(|start| {
+            let also = ALSO_PROMISING * starts[0].promise;
+            let fits = starts.iter().take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
                 Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &start.parameters)?))
             });
             fits.max_by(|a, b| a.score.total_cmp(&b.score))
@@ -185,11 +189,16 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     /// The same, the best of them with their last effect refined and fitted to the end: what a fit left undone would
-    /// else be credited to the next effect.
+    /// else be credited to the next effect. Where the very best leaves nothing to look for, only those that may rival it are.
     fn refined_best(&self, mut judged: Vec<Judged>) -> Vec<Judged> {
-        let rest = judged.split_off(BEAM.min(judged.len()));
-        let refined = judged.into_par_iter().map(|judged| self.finished(self.refined(judged)));
-        sorted(refined.chain(rest).collect())
+        let mut rest = judged.split_off(BEAM.min(judged.len()));
+        let mut others = judged.into_iter();
+        let Some(best) = others.next().map(|best| self.finished(self.refined(best))) else { return rest };
+        let is_enough = self.is_enough(&best.fitted.losses);
+        let (close, behind): (Vec<_>, Vec<_>) = others.partition(|other| !is_enough || other.explained > MAY_RIVAL);
+        rest.extend(behind);
+        let refined = close.into_par_iter().map(|judged| self.finished(self.refined(judged)));
+        sorted(refined.chain([best]).chain(rest).collect())
     }
 
     fn finished(&self, judged: Judged) -> Judged {
@@ -305,7 +314,11 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
         let Some(best) = self.best(&levels) else { return refused(wrong) };
-        if best.explained < LEAST_EXPLAINED.0 || !self.holds(&best.fitted)? {
+        if best.explained < LEAST_EXPLAINED.0 {
+            return refused(wrong);
+        }
+        let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
+        if !self.holds(&model)? {
             return refused(wrong);
         }
         let rivals = self.rivals(&best, &levels[best.fitted.hypothesis.parts.len() - 1]);
@@ -318,18 +331,16 @@ impl<'a, 'b> Search<'a, 'b> {
         } else {
             Verdict::PartlyExplained
         };
-        let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
         Some(Chosen { verdict, model, alternatives, rivals, singles })
     }
 
-    /// Whether a hypothesis, fitted to the samples that fits may see, does better on those that they may not.
-    fn holds(&self, fitted: &Fitted) -> Option<bool> {
-        let on_unseen = |fitted: &Fitted| {
-            let trained = self.bench.exact_fit(&fitted.hypothesis, &fitted.parameters, Scope::Training)?;
-            Some(self.bench.data.losses(&trained.residuals, Scope::HeldOut))
-        };
-        let (without, with) = (on_unseen(&self.baseline)?, on_unseen(fitted)?);
+    /// Whether a hypothesis that was fitted to the samples that fits may see does better on those that they may not.
+    fn holds(&self, trained: &Fitted) -> Option<bool> {
+        let Fitted { hypothesis, parameters, .. } = &self.baseline;
+        let baseline = self.bench.exact_fit(hypothesis, parameters, Scope::Training)?;
+        let unseen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, Scope::HeldOut);
+        let (without, with) = (unseen(&baseline), unseen(trained));
         let (before, after) = (beyond_noise(&without), beyond_noise(&with));
         let explained = 1.0 - self.unsound(&after) / total(&before).max(f64::MIN_POSITIVE);
         Some(gain(&without, &with) > 0.0 && explained > LEAST_EXPLAINED.1)

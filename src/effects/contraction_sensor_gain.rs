@@ -41,7 +41,7 @@ impl Effect for ContractionSensorGain {
         Readings { contraction: readings.contraction * (1.0 + self.relative_error), ..readings }
     }
 
-    fn true_contraction(&self, reading: f64, _force: f64) -> f64 {
+    fn true_contraction(&self, reading: f64, _force: f64, _time: f64) -> f64 {
         reading / (1.0 + self.relative_error)
     }
 

@@ -45,6 +45,8 @@ pub const AMBIENT_PRESSURE: f64 = 1e5;
 /// What the sensors show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readings {
+    /// Time since the start, s.
+    pub time: f64,
     /// Contraction, m.
     pub contraction: f64,
     /// Gauge pressure, Pa.
@@ -99,6 +101,10 @@ pub trait Effect: Declared + Default {
 
     /// Whether it changes nothing, whatever its shape parameters are.
     fn is_neutral(&self) -> bool;
+    /// Whether its states do not count.
+    fn rests(&self) -> bool {
+        self.is_neutral()
+    }
     /// One sentence for a person about the size that was found.
     fn sentence(&self) -> String;
 
@@ -115,8 +121,8 @@ pub trait Effect: Declared + Default {
     fn command_delay(&self) -> f64 {
         0.0
     }
-    /// Command in V on which the valve acts.
-    fn command(&self, command: f64) -> f64 {
+    /// Command in V on which the valve acts; the pressures that it asks for are not known yet.
+    fn command(&self, _at: &Point, _own: &[f64], command: f64) -> f64 {
         command
     }
     /// Gauge pressure in Pa that the valve goes for; that of the point is not known yet.
@@ -173,12 +179,13 @@ pub trait Effect: Declared + Default {
     fn readings(&self, readings: Readings) -> Readings {
         readings
     }
-    /// Contraction in m behind a reading of the position sensor, while the muscle pulls with a force in N.
-    fn true_contraction(&self, reading: f64, _force: f64) -> f64 {
+    /// Contraction in m behind a reading of the position sensor at a time in s since the start, while the muscle pulls with a
+    /// force in N.
+    fn true_contraction(&self, reading: f64, _force: f64, _time: f64) -> f64 {
         reading
     }
-    /// Gauge pressure in Pa behind a reading of the pressure sensor.
-    fn true_pressure(&self, reading: f64) -> f64 {
+    /// Gauge pressure in Pa behind a reading of the pressure sensor at a time in s since the start.
+    fn true_pressure(&self, reading: f64, _time: f64) -> f64 {
         reading
     }
 }
@@ -230,7 +237,7 @@ macro_rules! effects {
             /// Whether the states of all effects rest.
             #[inline]
             pub fn are_stateless(&self) -> bool {
-                true $(&& ($Effect::STATE_SCALES.is_empty() || self.$field.is_neutral()))*
+                true $(&& ($Effect::STATE_SCALES.is_empty() || self.$field.rests()))*
             }
 
             /// The sentence of the effect with this name.
@@ -261,7 +268,7 @@ macro_rules! effects {
                     let (own_rates, other_rates) = rest_rates.split_at_mut($Effect::STATE_SCALES.len());
                     (rest, rest_rates) = (others, other_rates);
                     own_rates.fill(0.0);
-                    if !own.is_empty() && !self.$field.is_neutral() {
+                    if !own.is_empty() && !self.$field.rests() {
                         self.$field.rates(at, own, own_rates);
                     }
                 )*
@@ -292,19 +299,13 @@ macro_rules! effects {
                 0.0 $(+ self.$field.contraction_delay())*
             }
 
+            chained! { "Command in V on which the valve acts."; command; $($field: $Effect;)* }
             chained! { "Gauge pressure in Pa that the valve goes for."; target_pressure; $($field: $Effect;)* }
             chained! { "Rate of the gauge pressure in Pa/s."; pressure_rate; $($field: $Effect;)* }
             chained! { "Contraction in m that the membrane feels."; effective_contraction; $($field: $Effect;)* }
             chained! { "Pull in N of the pressure on the virtual area."; area_force; $($field: $Effect;)* }
             chained! { "Pull in N of the elastic membrane."; elastic_force; $($field: $Effect;)* }
             chained! { "Pull of the muscle in N."; muscle_force; $($field: $Effect;)* }
-
-            /// Command in V on which the valve acts.
-            #[inline]
-            pub fn command(&self, mut command: f64) -> f64 {
-                $(command = self.$field.command(command);)*
-                command
-            }
 
             /// Cut-off of the valve in rad/s.
             #[inline]
@@ -347,19 +348,19 @@ macro_rules! effects {
                 readings
             }
 
-            /// Contraction in m behind a reading of the position sensor, while the muscle pulls with a force in N; a
-            /// delay is not undone.
-            pub fn true_contraction(&self, reading: f64, force: f64) -> f64 {
+            /// Contraction in m behind a reading of the position sensor at a time in s since the start, while the muscle
+            /// pulls with a force in N; a delay is not undone.
+            pub fn true_contraction(&self, reading: f64, force: f64, time: f64) -> f64 {
                 // The last effect on a reading is the first to be undone.
                 let undo = |reading: f64| reading;
-                $(let undo = |reading: f64| undo(self.$field.true_contraction(reading, force));)*
+                $(let undo = |reading: f64| undo(self.$field.true_contraction(reading, force, time));)*
                 undo(reading)
             }
 
-            /// Gauge pressure in Pa behind a reading of the pressure sensor.
-            pub fn true_pressure(&self, reading: f64) -> f64 {
+            /// Gauge pressure in Pa behind a reading of the pressure sensor at a time in s since the start.
+            pub fn true_pressure(&self, reading: f64, time: f64) -> f64 {
                 let undo = |reading: f64| reading;
-                $(let undo = |reading: f64| undo(self.$field.true_pressure(reading));)*
+                $(let undo = |reading: f64| undo(self.$field.true_pressure(reading, time));)*
                 undo(reading)
             }
         }
@@ -373,6 +374,11 @@ macro_rules! effects {
             }
         }
     };
+}
+
+/// Zero of something that warms up: o (1 + s exp(-t/τ)), for an offset o, a `share` s and a `time_constant` τ in s.
+fn settling(offset: f64, share: f64, time_constant: f64, time: f64) -> f64 {
+    if share == 0.0 { offset } else { offset * (1.0 + share * (-time / time_constant).exp()) }
 }
 
 // One line per effect: adding one is its file and a line here. In the order of the signal.

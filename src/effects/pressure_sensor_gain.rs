@@ -42,7 +42,7 @@ impl Effect for PressureSensorGain {
         Readings { gauge_pressure: readings.gauge_pressure * (1.0 + self.relative_error), ..readings }
     }
 
-    fn true_pressure(&self, reading: f64) -> f64 {
+    fn true_pressure(&self, reading: f64, _time: f64) -> f64 {
         reading / (1.0 + self.relative_error)
     }
 

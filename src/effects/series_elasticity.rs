@@ -70,7 +70,7 @@ impl Effect for SeriesElasticity {
         Readings { contraction: readings.contraction + self.way(self.compliance, readings.force), ..readings }
     }
 
-    fn true_contraction(&self, reading: f64, force: f64) -> f64 {
+    fn true_contraction(&self, reading: f64, force: f64, _time: f64) -> f64 {
         reading - self.way(self.compliance, force)
     }
 

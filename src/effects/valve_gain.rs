@@ -1,4 +1,4 @@
-use super::{Description, Effect};
+use super::{Description, Effect, Point};
 
 /// Command in V at which the gain is stated when the characteristic is bent: the middle of the usual range.
 const MIDDLE: f64 = 2.0;
@@ -43,7 +43,7 @@ impl Effect for ValveGain {
         self.relative_error == 0.0 && self.bend == 0.0
     }
 
-    fn command(&self, command: f64) -> f64 {
+    fn command(&self, _at: &Point, _own: &[f64], command: f64) -> f64 {
         command * (1.0 + self.relative_error + self.bend * (command - MIDDLE))
     }
 

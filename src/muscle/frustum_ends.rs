@@ -55,7 +55,7 @@ impl ForceModel for FrustumEnds {
             let (_, _, height, slope) = geometry(middle);
             let change = (length - middle - 2.0 * height) / (1.0 + 2.0 * slope);
             middle += change;
-            if !(change.abs() > 1e-14 * length) {
+            if change.abs() <= 1e-14 * length {
                 break;
             }
         }

@@ -1,5 +1,9 @@
 """Builds the tool and exports its FMUs once for all tests."""
 
+import os
+import sysconfig
+from pathlib import Path
+
 import pytest
 
 from support import MODELS, ROOT, TARGET, Fmu, run, write_parameters
@@ -61,3 +65,25 @@ def fmu(request, export):
 @pytest.fixture(scope="session")
 def muscle(export):
     return export()["PneumaticMuscle"]
+
+
+@pytest.fixture(scope="session")
+def cargo_of_importer():
+    """Runs cargo on the program in tests/importer, with the libclang of this Python environment."""
+    include = run("gcc", "-print-file-name=include").stdout.strip()  # the wheel of libclang has no headers of its own
+    environment = os.environ | {
+        "LIBCLANG_PATH": str(Path(sysconfig.get_paths()["purelib"]) / "clang" / "native"),
+        "BINDGEN_EXTRA_CLANG_ARGS": f"-I{include}",
+        "CARGO_TARGET_DIR": str(TARGET / "importer"),
+    }
+
+    def cargo(command, *options):
+        run("cargo", command, "--locked", *options, cwd=ROOT / "tests" / "importer", env=environment)
+    return cargo
+
+
+@pytest.fixture(scope="session")
+def importer(cargo_of_importer):
+    """Path of the importer in Rust, freshly built."""
+    cargo_of_importer("build")
+    return TARGET / "importer" / "debug" / "importer"

@@ -24,12 +24,14 @@ from fmpy.logging import addLoggerProxy
 ROOT = Path(__file__).resolve().parents[2]
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
 REFERENCE = ROOT / "tests" / "reference"
+EXAMPLES = ROOT / "examples"
 MODELS = ("PneumaticMuscle", "PneumaticActuator", "PidFeedForward", "ReferenceTrajectory")
 
 # Tools of this Python environment (fmutool, cargo-zigbuild) are found without activating it.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 # The muscle models of the reference programs, which share no code with the product.
 sys.path.insert(0, str(REFERENCE))
+sys.path.insert(0, str(EXAMPLES))
 
 __all__ = ["FMICallException"]
 
@@ -89,8 +91,12 @@ class Fmu:
 class Log(list):
     """What an FMU told its host: (status, category, message)."""
 
+    # FMPy gives the messages of all FMUs to the logger that was made last: it has to live as long as the process.
+    _all = []
+
     def __init__(self):
         super().__init__()
+        self._all.append(self)
         self.callbacks = fmi2CallbackFunctions()
         self.callbacks.logger = fmi2CallbackLoggerTYPE(self._take)
         self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)

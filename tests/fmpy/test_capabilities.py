@@ -128,6 +128,16 @@ def test_output_derivatives_are_those_of_the_outputs(fmu):
     assert quotient == pytest.approx(0.5 * (slope_before + slope_after), rel=1e-3, abs=1e-4)
 
 
+def test_output_derivatives_do_not_straddle_a_corner_of_the_reference(export):
+    """The acceleration jumps where the motion begins; a difference across the jump would be thousands of m/s³."""
+    velocity, acceleration = 0.03, 0.05
+    with Instance(export()["ReferenceTrajectory"], {"velocity": velocity, "acceleration": acceleration}) as instance:
+        names = ("setpoint", "setpoint_velocity", "setpoint_acceleration")
+        assert instance.output_derivatives(*names) == pytest.approx([0.0, acceleration, 0.0])
+        instance.step(velocity / acceleration)  # to where the velocity has been reached
+        assert instance.output_derivatives(*names) == pytest.approx([velocity, 0.0, 0.0])
+
+
 def test_input_derivatives_make_a_ramp(muscle):
     """One long step under a ramp: the first-order valve has its closed-form pressure."""
     start, slope, duration, bandwidth, gain = 2.0, 4.0, 0.25, 15.0, 1e5

@@ -1,9 +1,5 @@
 """FMPy (Python), libcosim (C++, FMILibrary) and the crate `fmi` (Rust) get the same numbers from the same FMU."""
 
-import os
-import sysconfig
-from pathlib import Path
-
 import numpy as np
 import pytest
 from libcosimpy.CosimExecution import CosimExecution
@@ -11,7 +7,7 @@ from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from support import ROOT, TARGET, Instance, run
+from support import Instance, run
 
 STEP, STEPS = 1e-3, 2000
 START = {"load.mass": 40.0, "initial.gauge_pressure": 2e5, "valve.command": 3.0, "load.external_force": 5.0,
@@ -20,25 +16,8 @@ OUTPUTS = ("muscle.contraction", "muscle.contraction_velocity", "muscle.gauge_pr
            "measured.contraction")
 
 
-def cargo(command, *options):
-    """Runs cargo on the small program in tests/importer with the libclang of this Python environment."""
-    include = run("gcc", "-print-file-name=include").stdout.strip()  # the wheel of libclang has no headers of its own
-    environment = os.environ | {
-        "LIBCLANG_PATH": str(Path(sysconfig.get_paths()["purelib"]) / "clang" / "native"),
-        "BINDGEN_EXTRA_CLANG_ARGS": f"-I{include}",
-        "CARGO_TARGET_DIR": str(TARGET / "importer"),
-    }
-    run("cargo", command, "--locked", *options, cwd=ROOT / "tests" / "importer", env=environment)
-
-
-@pytest.fixture(scope="session")
-def importer():
-    cargo("build")
-    return TARGET / "importer" / "debug" / "importer"
-
-
-def test_importer_is_clean():
-    cargo("clippy", "--", "-D", "warnings")
+def test_importer_is_clean(cargo_of_importer):
+    cargo_of_importer("clippy", "--", "-D", "warnings")
 
 
 def with_fmpy(fmu):

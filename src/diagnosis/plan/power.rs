@@ -336,10 +336,11 @@ fn simulated(model: &Parameters, place: Place, recording: &Recording) -> Option<
 /// As [`simulated`]; `None` as well where pressure or contraction leave the limits.
 fn within(model: &Parameters, place: Place, recording: &Recording, limits: &Limits) -> Option<Readings> {
     let readings = simulated(model, place, recording)?;
-    let true_pressure = |reading: &f64| model.effects.true_pressure(*reading);
+    // Zeros that settle count as they are at the start.
+    let true_pressure = |reading: &f64| model.effects.true_pressure(*reading, 0.0);
     let (low, high) = (-0.02 * model.muscle.rest_length, limits.most_contraction(model));
     let contractions = readings[1].iter().zip(&readings[2]);
-    let true_contraction = |(reading, force): (&f64, &f64)| model.effects.true_contraction(*reading, *force);
+    let true_contraction = |(reading, force): (&f64, &f64)| model.effects.true_contraction(*reading, *force, 0.0);
     // A simulation of numbers: half a percent is no excess.
     let fine = readings[0].iter().map(true_pressure).all(|pressure| pressure <= 1.005 * limits.most_pressure)
         && contractions.map(true_contraction).all(|contraction| (low..=1.005 * high).contains(&contraction));

@@ -1,61 +1,75 @@
-//! Steps an FMU with the crate `fmi` and prints what comes out:
-//! `importer MODEL.fmu STEP_SIZE STEPS [NAME=VALUE]… NAME…`.
+//! Runs FMUs with the crate `fmi` and prints what comes out:
+//! `importer MODEL.fmu STEP_SIZE STEPS [NAME=VALUE]… NAME…` or
+//! `importer SYSTEM.ssp STEP_SIZE STEPS [--zero-first-inputs] COMPONENT.NAME…`.
 //!
 //! `NAME=VALUE` is set before the initialisation; the other names become columns of the CSV on stdout, behind `time`.
 //! Numbers are written with all their digits.
 
-use fmi::fmi2::import::Fmi2Import;
-use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
-use fmi::traits::FmiImport;
-use std::error::Error;
+mod component;
+mod system;
 
-fn main() -> Result<(), Box<dyn Error>> {
+use component::Component;
+use std::error::Error;
+use system::System;
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [path, step_size, steps, names @ ..] = arguments.as_slice() else {
-        return Err("usage: importer MODEL.fmu STEP_SIZE STEPS [NAME=VALUE]... NAME...".into());
+        return Err("usage: importer MODEL.fmu|SYSTEM.ssp STEP_SIZE STEPS [OPTION]... NAME...".into());
     };
-    let import: Fmi2Import = fmi::import::from_path(path)?;
-    let (starts, outputs): (Vec<&str>, Vec<&str>) =
-        names.iter().map(String::as_str).partition(|name| name.contains('='));
-    let mut instance = import.instantiate_cs("importer", false, true)?;
-    set_starts(&import, &mut instance, &starts)?;
-    instance.setup_experiment(None, 0.0, None)?;
-    instance.enter_initialization_mode()?;
-    instance.exit_initialization_mode()?;
-    print_steps(&import, &mut instance, step_size.parse()?, steps.parse()?, &outputs)?;
-    instance.terminate()?;
-    Ok(())
-}
-
-fn value_reference(import: &Fmi2Import, name: &str) -> Result<u32, Box<dyn Error>> {
-    Ok(import.model_description().model_variable_by_name(name)?.value_reference)
-}
-
-fn set_starts(import: &Fmi2Import, instance: &mut InstanceCS, starts: &[&str]) -> Result<(), Box<dyn Error>> {
-    for (name, value) in starts.iter().filter_map(|start| start.split_once('=')) {
-        instance.set_real(&[value_reference(import, name)?], &[value.parse()?])?;
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let (step_size, steps) = (step_size.parse()?, steps.parse()?);
+    if path.ends_with(".ssp") {
+        run_system(path, step_size, steps, &names)
+    } else {
+        run_fmu(path, step_size, steps, &names)
     }
-    Ok(())
 }
 
-fn print_steps(
-    import: &Fmi2Import,
-    instance: &mut InstanceCS,
-    step_size: f64,
-    steps: u32,
-    outputs: &[&str],
-) -> Result<(), Box<dyn Error>> {
-    let references = outputs.iter().map(|name| value_reference(import, name)).collect::<Result<Vec<_>, _>>()?;
-    let mut values = vec![0.0; references.len()];
+fn run_fmu(path: &str, step_size: f64, steps: u32, names: &[&str]) -> Result<()> {
+    let mut fmu = Component::new("importer", &std::fs::read(path)?)?;
+    let (starts, outputs): (Vec<&str>, Vec<&str>) = names.iter().partition(|name| name.contains('='));
+    for (name, value) in starts.iter().filter_map(|start| start.split_once('=')) {
+        fmu.set(name, value.parse()?)?;
+    }
+    fmu.enter_initialization()?;
+    fmu.exit_initialization()?;
     println!("time,{}", outputs.join(","));
     for step in 0..=steps {
-        instance.get_real(&references, &mut values)?;
         let time = f64::from(step) * step_size;
-        let row: Vec<String> = std::iter::once(&time).chain(&values).map(|value| format!("{value:?}")).collect();
-        println!("{}", row.join(","));
+        print_row(time, outputs.iter().map(|name| fmu.get(name)))?;
         if step < steps {
-            instance.do_step(time, step_size, true)?;
+            fmu.step(time, step_size)?;
         }
     }
+    Ok(())
+}
+
+fn run_system(path: &str, step_size: f64, steps: u32, names: &[&str]) -> Result<()> {
+    let (options, outputs): (Vec<&str>, Vec<&str>) = names.iter().partition(|name| name.starts_with("--"));
+    let first_inputs_are_zero = match options.as_slice() {
+        [] => false,
+        ["--zero-first-inputs"] => true,
+        _ => return Err(format!("unknown options {options:?}").into()),
+    };
+    let mut system = System::open(path)?;
+    system.initialize(first_inputs_are_zero)?;
+    println!("time,{}", outputs.join(","));
+    for step in 0..=steps {
+        let time = f64::from(step) * step_size;
+        print_row(time, outputs.iter().map(|name| system.get(name)))?;
+        if step < steps {
+            system.step(time, step_size)?;
+        }
+    }
+    Ok(())
+}
+
+fn print_row(time: f64, values: impl Iterator<Item = Result<f64>>) -> Result<()> {
+    let values = values.collect::<Result<Vec<_>>>()?;
+    let row: Vec<String> = std::iter::once(&time).chain(&values).map(|value| format!("{value:?}")).collect();
+    println!("{}", row.join(","));
     Ok(())
 }
