@@ -99,3 +99,26 @@ fn a_muscle_of_another_size_takes_normalised_parameters_exactly() {
         assert!(cross.errors.rms < 1e-3, "{} on {}: {} N", cross.of, cross.on, cross.errors.rms);
     }
 }
+
+#[test]
+fn slow_trajectories_pass_where_the_muscle_rests_and_fast_ones_lag() {
+    use sinew::comparison::dynamic::{TRAJECTORIES, simulated, trajectory};
+    use sinew::identification::points::Branch;
+    let parameters = Parameters::default();
+    let pressures = [1e5, 2e5, 3e5, 4e5];
+    let mut worst = Vec::new();
+    for values in TRAJECTORIES {
+        let played = trajectory(&parameters, values, [0.5e5, 4.5e5], 30.0);
+        let passages = simulated(&parameters, &played, &pressures).unwrap();
+        assert_eq!(passages.len(), 2 * pressures.len(), "{passages:?}");
+        for passage in &passages {
+            let ahead = passage.dynamic - passage.at_rest;
+            // What moves lags behind: shorter on the way back, longer on the way there.
+            let lag = if passage.branch == Branch::Shortening { -ahead } else { ahead };
+            assert!(lag > -3e-3, "{values:?}: {passage:?}");
+        }
+        worst.push(passages.iter().map(|p| (p.dynamic - p.at_rest).abs()).fold(0.0, f64::max));
+    }
+    println!("largest difference from rest, m: {worst:?}");
+    assert!(worst[0] < 1e-3 && worst[5] > 5.0 * worst[0], "{worst:?}");
+}

@@ -1,11 +1,12 @@
 //! Force models compared on measured muscles: the assessment of the thesis, on anybody's data.
 //!
 //! [`errors`] and [`assess`] judge one model, [`cross`] takes its parameters to another muscle, [`isometric`] makes curves at
-//! fixed length, [`claims`] says whether what the thesis claims holds, and [`report`] shows it all.
+//! fixed length, [`dynamic`] sets motion against rest, [`claims`] says whether what the thesis claims holds, and [`report`] shows it all.
 
 pub mod assess;
 pub mod claims;
 pub mod cross;
+pub mod dynamic;
 pub mod errors;
 pub mod isometric;
 pub mod report;
