@@ -263,13 +263,14 @@ impl ForceModels {
         let first = along_tangent(0.0);
         // Exact where the pressure works on an area that does not depend on it.
         let reached = lack(first).abs() <= 1e-9 * pull.abs().max(1.0);
-        if reached || first.is_nan() || lack(0.0) <= 0.0 {
+        if reached && first >= 0.0 || first.is_nan() || lack(0.0) <= 0.0 {
             return first;
         }
         let samples = 50;
         let at = |k: i32| HIGHEST_PRESSURE * f64::from(k) / f64::from(samples);
         match (0..samples).find(|&k| lack(at(k)) > 0.0 && lack(at(k + 1)) <= 0.0) {
             Some(k) => bisect(lack, at(k), at(k + 1)),
+            None if reached => first,
             None => along_tangent(HIGHEST_PRESSURE),
         }
     }
