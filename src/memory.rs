@@ -251,13 +251,7 @@ fn follow_with_play(position: &mut f64, half_width: f64, line: Line, mut tell: i
 }
 
 /// Stiction: the position stays until it is off by the threshold, and jumps to the line then. On a steep line it moves on.
-fn follow_with_stiction(
-    position: &mut f64,
-    moving: &mut f64,
-    threshold: f64,
-    line: Line,
-    mut tell: impl FnMut(Line),
-) {
+fn follow_with_stiction(position: &mut f64, moving: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
     let (speed, direction) = (line.slope.abs(), line.slope.signum());
     let steep = threshold < SHORTEST_REST * speed;
     let moves_on = steep && *moving == direction;

@@ -1,7 +1,4 @@
-use super::{Description, Effect};
-
-/// Force in N at which the gain is stated when it changes with the force.
-const MIDDLE: f64 = 400.0;
+use super::{Description, Effect, REFERENCE_FORCE, scaled};
 
 crate::variables::variables! {
     /// A muscle that is stronger or weaker as a whole.
@@ -44,7 +41,7 @@ impl Effect for ForceGain {
     }
 
     fn static_force(&self, force: f64) -> f64 {
-        force * (1.0 + self.relative_error + self.bend * (force / MIDDLE - 1.0))
+        scaled(force, self.relative_error, self.bend, REFERENCE_FORCE)
     }
 
     fn sentence(&self) -> String {
