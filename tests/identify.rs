@@ -54,6 +54,7 @@ fn grid(muscle: &Parameters) -> Vec<Point> {
 #[test]
 fn parameters_lie_within_their_intervals() {
     const DRAWS: u64 = 200;
+    let mut missed = Vec::new();
     for model in all_models() {
         let truth = Parameters::preset(&format!("dmsp-40-1000/{}", model_name(model))).unwrap();
         let mut points = grid(&truth);
@@ -74,9 +75,12 @@ fn parameters_lie_within_their_intervals() {
         }
         for (parameter, hits) in structure.free.iter().zip(hits) {
             println!("{:<36} {:5.1} %", parameter.variable.name, 100.0 * hits as f64 / DRAWS as f64);
-            assert!(10 * hits >= 9 * DRAWS, "{}: within its interval in {hits} of {DRAWS}", parameter.variable.name);
+            if 10 * hits < 9 * DRAWS {
+                missed.push(format!("{}: within its interval in {hits} of {DRAWS}", parameter.variable.name));
+            }
         }
     }
+    assert!(missed.is_empty(), "{missed:?}");
 }
 
 /// Where the thesis' own numbers hold.
@@ -123,7 +127,9 @@ fn elasticity_repairs_the_plain_model_on_the_reconstructed_muscles() {
         // there: the cubic cannot follow the short muscle where a load stretches it.
         let [ideal, elastic] = [plain, improved].map(|model| rms(model, Braid::Given, &isotonic));
         let fitted = rms(improved, Braid::Fitted, &isotonic);
-        println!("{length}, isotonic: mckibben {ideal:.1} N, improved-mckibben {elastic:.1} N, braid fitted {fitted:.1} N");
+        println!(
+            "{length}, isotonic: mckibben {ideal:.1} N, improved-mckibben {elastic:.1} N, braid fitted {fitted:.1} N"
+        );
         assert!(fitted <= bar, "{length}: {fitted} N");
         assert!(elastic < 0.2 * ideal, "{length}: {elastic} N");
     }
