@@ -206,23 +206,34 @@ impl<'a, 'b> Search<'a, 'b> {
         self.bench.exact_fit(hypothesis, parameters, Scope::All).map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// The hypothesis with refinements of its last effect free, one of them or all, where the data pay for them.
-    fn refined(&self, judged: Judged) -> Judged {
+    /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
+    /// for them. What hid a refinement of an earlier effect may have been the last one.
+    fn refined(&self, mut judged: Judged) -> Judged {
+        for which in (0..judged.fitted.hypothesis.parts.len()).rev() {
+            judged = self.part_refined(judged, which);
+        }
+        judged
+    }
+
+    fn part_refined(&self, judged: Judged, which: usize) -> Judged {
         let nothing_left = beyond_noise(&judged.fitted.losses).values().all(|left| *left <= NEGLIGIBLE);
-        let Some(last) = judged.fitted.hypothesis.parts.last().filter(|_| !nothing_left) else { return judged };
-        let each = (0..last.effect.refinements.len()).map(Refined::By);
+        let part = judged.fitted.hypothesis.parts[which];
+        if nothing_left || part.refined != Refined::Not {
+            return judged;
+        }
+        let each = (0..part.effect.refinements.len()).map(Refined::By);
         let refined = each.chain([Refined::Fully]).collect::<Vec<_>>().into_par_iter();
-        let better = refined.filter_map(|refined| self.refined_by(&judged, refined));
+        let better = refined.filter_map(|refined| self.refined_by(&judged, which, refined));
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
-    fn refined_by(&self, judged: &Judged, refined: Refined) -> Option<Judged> {
+    fn refined_by(&self, judged: &Judged, which: usize, refined: Refined) -> Option<Judged> {
         let mut hypothesis = judged.fitted.hypothesis.clone();
-        let last = hypothesis.parts.last_mut()?;
-        let known: Vec<&str> = last.freed().map(|(name, _)| *name).collect();
-        last.refined = refined;
+        let part = &mut hypothesis.parts[which];
+        let known: Vec<&str> = part.freed().map(|(name, _)| *name).collect();
+        part.refined = refined;
         let mut start = judged.fitted.parameters;
-        for (name, values) in last.freed().filter(|(name, _)| !known.contains(name)) {
+        for (name, values) in part.freed().filter(|(name, _)| !known.contains(name)) {
             start.set(name, values[0]).ok()?;
         }
         Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
