@@ -71,8 +71,8 @@ fn a_recording_is_followed_beside_the_physical_model() {
 
 #[test]
 fn what_is_missing_is_said() {
-    let rows: String = (0..20).map(|k| format!("{k},{}\n", k % 3)).collect();
-    let text = format!("time [s],command [V]\n{rows}");
+    let rows: String = (0..20).map(|k| format!("{k},{},20,1e5\n", k % 3)).collect();
+    let text = format!("time [s],command [V],load_mass [kg],gauge_pressure [Pa]\n{rows}");
     let recording = Recording::parse(text.as_bytes(), Path::new("r.csv"), &[]).unwrap();
     let said = identify(&recording, &Parameters::default()).unwrap_err().to_string();
     assert!(said.contains("`contraction [m]`"), "{said}");
