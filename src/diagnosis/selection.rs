@@ -188,8 +188,8 @@ impl<'a, 'b> Search<'a, 'b> {
         sorted(starts.into_par_iter().filter_map(best).collect())
     }
 
-    /// The same, the best of them with their last effect refined and fitted to the end: what a fit left undone would
-    /// else be credited to the next effect. Where the very best leaves nothing to look for, only those that may rival it are.
+    /// The same, the best of them with their last effect, and the very best with all of its effects, refined and fitted to the
+    /// end: what a fit left undone would else be credited to the next effect. Where the very best leaves nothing to look for, only those that may rival it are.
     fn refined_best(&self, mut judged: Vec<Judged>) -> Vec<Judged> {
         let mut rest = judged.split_off(BEAM.min(judged.len()));
         let mut others = judged.into_iter();
@@ -197,7 +197,10 @@ impl<'a, 'b> Search<'a, 'b> {
         let is_enough = self.is_enough(&best.fitted.losses);
         let (close, behind): (Vec<_>, Vec<_>) = others.partition(|other| !is_enough || other.explained > MAY_RIVAL);
         rest.extend(behind);
-        let refined = close.into_par_iter().map(|judged| self.finished(self.refined(judged)));
+        let refined = close.into_par_iter().map(|judged| {
+            let last = judged.fitted.hypothesis.parts.len() - 1;
+            self.finished(self.part_refined(judged, last))
+        });
         sorted(refined.chain([best]).chain(rest).collect())
     }
 
@@ -208,11 +211,9 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
     /// for them. What hid a refinement of an earlier effect may have been the last one.
-    fn refined(&self, mut judged: Judged) -> Judged {
-        for which in (0..judged.fitted.hypothesis.parts.len()).rev() {
-            judged = self.part_refined(judged, which);
-        }
-        judged
+    fn refined(&self, judged: Judged) -> Judged {
+        let parts = (0..judged.fitted.hypothesis.parts.len()).rev();
+        parts.fold(judged, |judged, which| self.part_refined(judged, which))
     }
 
     fn part_refined(&self, judged: Judged, which: usize) -> Judged {
