@@ -29,9 +29,10 @@ MASTERS = [(name, how, derivatives) for name, how in (("at once", exchange), ("i
 
 
 def export(sinew, parameters, target, mass, folder):
-    """The closed loop with a load; its path."""
+    """The closed loop with a load, and with a target that is not that of the preset, if one is given; its path."""
     source = folder / f"{mass:g}kg.toml"
-    source.write_text(f'preset = "{parameters}"\n[load]\nmass = {mass}\n[reference]\ntarget = {target}\n')
+    motion = "" if target is None else f"[reference]\ntarget = {target}\n"
+    source.write_text(f'preset = "{parameters}"\n[load]\nmass = {mass}\n{motion}')
     out = folder / f"{mass:g}kg"
     subprocess.run([sinew, "export", "--parameters", source, "--out", out], check=True, stdout=subprocess.DEVNULL)
     return out / "ClosedLoop.ssp"
@@ -70,7 +71,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sinew", default="sinew", help="the command")
     parser.add_argument("--parameters", default="dmsp-40-1000", help="preset")
-    parser.add_argument("--target", type=float, default=0.15, help="contraction at the end in m; begins at 0")
+    parser.add_argument("--target", type=float, help="contraction at the end in m [default: that of the preset]")
     arguments = parser.parse_args()
     print("| values are exchanged | input derivatives | largest stable step | "
           + " | ".join(f"error at {1e3 * step:g} ms" for step in SHOWN) + " |")

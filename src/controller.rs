@@ -124,9 +124,21 @@ fn reference_pressure(parameters: &Parameters, setpoint: f64, velocity: f64, acc
     let of_damping = feed_forward.damping * muscle.damping * velocity;
     // What of the elastic force is not fed forward is taken for granted.
     let granted = (1.0 - feed_forward.elastic) * force_models.elastic_force(muscle, setpoint);
-    let pressure = holding_pressure(parameters, setpoint, of_load + of_damping + granted);
-    // A setpoint that the muscle cannot reach may ask for any pressure or none (NaN): `max` makes that the lowest.
-    pressure.max(valve.gain * controller.minimum_command).min(valve.gain * controller.maximum_command)
+    let pull = of_load + of_damping + granted;
+    let pressure = holding_pressure(parameters, setpoint, pull);
+    let [lowest, highest] = [controller.minimum_command, controller.maximum_command].map(|u| valve.gain * u);
+    if (lowest..=highest).contains(&pressure) {
+        return pressure;
+    }
+    // Beyond its reach the muscle pulls less the higher the pressure, and asks for any: what is too far takes the highest.
+    if force_models.force(muscle, highest, setpoint) < pull { highest } else { lowest.min(highest) }
+}
+
+/// Whether the muscle can hold the load still at a contraction in m by a command within its limits.
+pub fn can_hold(parameters: &Parameters, contraction: f64) -> bool {
+    let Parameters { load, valve, controller, .. } = parameters;
+    let command = holding_pressure(parameters, contraction, load.mass * GRAVITY) / valve.gain;
+    (controller.minimum_command..=controller.maximum_command).contains(&command)
 }
 
 /// Half the time in s over which the rate of the reference pressure is taken: the setpoint hardly moves meanwhile.

@@ -14,7 +14,7 @@ use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
 use sinew::simulation::{OUTPUTS, replay, rms_difference};
-use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, tuning};
+use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, ssp, tuning};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -594,6 +594,7 @@ fn run_demo(out: &Path) -> Result<Answer> {
 
 fn export_fmus(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {
     let files = export::export(parameters, &package::libraries(libraries)?, out)?;
+    ssp::warnings(parameters).iter().for_each(|note| eprintln!("note: {note}"));
     let paths: Vec<_> = files.iter().map(|path| path.display().to_string()).collect();
     Ok(Answer { text: paths.join("\n"), json: json!({ "files": paths }) })
 }

@@ -88,6 +88,9 @@ const PRESETS: &[Preset] = &[
 /// The controller as the thesis prints it; a variant of every preset.
 const THESIS_CONTROLLER: &str = include_str!("../presets/thesis.toml");
 
+/// Gains for the force models that the gains of a muscle were not tuned on, by the name of the variant.
+const GAINS: &str = include_str!("../presets/gains.toml");
+
 /// A model without elastic force holds a load only under pressure.
 const UNDER_PRESSURE: &str = include_str!("../presets/under-pressure.toml");
 
@@ -137,6 +140,11 @@ impl Parameters {
         let base = parts.next().and_then(|base| PRESETS.iter().find(|p| p.name == base)).ok_or_else(unknown)?;
         let mut parameters = Self::default();
         parameters.apply_toml(base.toml, base.name)?;
+        // Gains first: a variant may have its own.
+        let gains: toml::Table = toml::from_str(GAINS).expect("a table of the program's own");
+        if let Some(gains) = name.split('/').skip(1).find_map(|model| gains.get(&format!("{}/{model}", base.name))) {
+            parameters.apply_value("controller", gains)?;
+        }
         for variant in parts {
             match variant {
                 "thesis" => parameters.apply_toml(THESIS_CONTROLLER, "thesis")?,

@@ -3,11 +3,14 @@
 //! Importers differ in what they honour, so the description keeps to what all of them do: a flat system, the usual name space
 //! prefixes, only connected connectors, SI units, and every value of the parameter sets also as the FMU's start value.
 
+use crate::controller::{Controller, can_hold};
+use crate::load::Load;
 use crate::model::Interface;
 use crate::models::models;
 use crate::package::{Library, fmu, zip};
 use crate::parameters::Parameters;
 use crate::simulation::at_rest_on_reference;
+use crate::tuning::is_stable;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use std::io;
@@ -50,6 +53,29 @@ pub fn closed_loop(parameters: &Parameters, libraries: &[Library]) -> Vec<u8> {
         files.push((format!("resources/{fmu_name}.fmu"), fmu(interface, &parameters, libraries)));
     }
     zip(&files)
+}
+
+/// Why the closed loop will not follow its reference, in words: its load cannot be held where the reference starts or
+/// ends, or not by these gains.
+pub fn warnings(parameters: &Parameters) -> Vec<String> {
+    let Parameters { reference, load: Load { mass }, controller, .. } = parameters;
+    let Controller { minimum_command, maximum_command, .. } = controller;
+    let problem = |name: &str, contraction: f64| {
+        let place = format!("{mass} kg at `{name}`, {contraction} m");
+        if !can_hold(parameters, contraction) {
+            Some(format!(
+                "{FILE_NAME}: from {minimum_command} to {maximum_command} V the muscle cannot hold {place}; choose another contraction or load"
+            ))
+        } else if !is_stable(parameters, contraction) {
+            Some(format!(
+                "{FILE_NAME}: with these gains the loop is not stable with {place}; `sinew tune` finds others"
+            ))
+        } else {
+            None
+        }
+    };
+    let ends = [("reference.start", reference.start), ("reference.target", reference.target)];
+    ends.into_iter().filter_map(|(name, contraction)| problem(name, contraction)).collect()
 }
 
 type Xml = Writer<Vec<u8>>;

@@ -14,8 +14,8 @@ use rayon::prelude::*;
 pub const LOADS: [f64; 3] = [20.0, 40.0, 80.0];
 /// Velocities of section 5.4, m/s.
 pub const VELOCITIES: [f64; 3] = [0.01, 0.03, 0.05];
-/// Muscles with their strokes in m.
-pub const MUSCLES: [(&str, f64); 2] = [("dmsp-40-1000", 0.15), ("dmsp-40-290", 0.05)];
+/// Muscles of section 5.4, as presets, whose `reference.target` is the end of the motion.
+pub const MUSCLES: [&str; 2] = ["dmsp-40-1000", "dmsp-40-290"];
 /// Time between two exchanges of signals, s.
 const STEP: f64 = 1e-3;
 /// Time that the loop is given after the motion, s; its last part is judged.
@@ -30,8 +30,6 @@ pub const LIMIT_CYCLE: f64 = 0.5e-3;
 pub struct Case {
     /// Preset of the muscle.
     pub muscle: &'static str,
-    /// Contraction at the end of the motion, m; it starts at zero.
-    pub stroke: f64,
     /// Load, kg.
     pub mass: f64,
     /// Velocity of the motion, m/s.
@@ -41,21 +39,19 @@ pub struct Case {
 /// All of them, by muscle, load and velocity.
 pub fn cases() -> Vec<Case> {
     let mut all = Vec::new();
-    for (muscle, stroke) in MUSCLES {
+    for muscle in MUSCLES {
         for mass in LOADS {
-            all.extend(VELOCITIES.map(|velocity| Case { muscle, stroke, mass, velocity }));
+            all.extend(VELOCITIES.map(|velocity| Case { muscle, mass, velocity }));
         }
     }
     all
 }
 
 impl Case {
-    /// The parameters with load and motion of this case.
+    /// The parameters with load and velocity of this case.
     fn applied(&self, parameters: &Parameters) -> Parameters {
         let mut parameters = *parameters;
         parameters.load.mass = self.mass;
-        parameters.reference.start = 0.0;
-        parameters.reference.target = self.stroke;
         parameters.reference.velocity = self.velocity;
         parameters
     }

@@ -260,7 +260,7 @@ fn random_section(evaluation: &Evaluation) -> String {
 
 /// Muscle and load of each pair of figures.
 fn figure_cases() -> Vec<(&'static str, f64)> {
-    MUSCLES.iter().flat_map(|(muscle, _)| LOADS.map(|mass| (*muscle, mass))).collect()
+    MUSCLES.iter().flat_map(|muscle| LOADS.map(|mass| (*muscle, mass))).collect()
 }
 
 /// File names of position and error.

@@ -50,6 +50,9 @@ pub fn roots(polynomial: &[f64]) -> Vec<Complex<f64>> {
     companion.complex_eigenvalues().iter().map(|root| root * size).collect()
 }
 
+/// Velocity in m/s at which dry friction slips: the fastest of thesis section 5.4.
+const SLIPPING: f64 = 0.05;
+
 /// Valve, muscle and load at rest, linearised.
 ///
 /// # Model
@@ -57,7 +60,7 @@ pub fn roots(polynomial: &[f64]) -> Vec<Complex<f64>> {
 /// V; the command acts after a `dead_time`. The transfer function from u to x is b e^(−sθ)/(s³ + d₂ s² + d₁ s + d₀).
 ///
 /// # Validity
-/// States of effects rest.
+/// States of effects rest. Damping is the least of that at rest and that in motion.
 ///
 /// # Reference
 /// Thesis eq. 5.5 drops the stiffness −∂F/∂x, the damping and the area ∂F/∂p.
@@ -94,6 +97,13 @@ impl LinearPlant {
             let (above, below) = (rates_at(&above, command), rates_at(&below, command));
             (0..3).for_each(|row| rates[row][column] = (above[row] - below[row]) / (2.0 * step));
         }
+        // Of dry friction only what is left while it slips: at rest it looks like damping that is gone when the load moves.
+        let slope_at = |velocity: f64| {
+            let [above, below] =
+                [1e-6, -1e-6].map(|step| rates_at(&[pressure, contraction, velocity + step], command)[2]);
+            (above - below) / 2e-6
+        };
+        rates[2][2] = [SLIPPING, -SLIPPING].map(slope_at).into_iter().fold(rates[2][2], f64::max);
         let step = 1e-4;
         let input = (rates_at(&rest, command + step)[0] - rates_at(&rest, command - step)[0]) / (2.0 * step);
         let dead_time = parameters.effects.command_delay();

@@ -16,7 +16,7 @@ mod report;
 
 pub use report::{files, to_json};
 
-use crate::controller::Controller;
+use crate::controller::{Controller, can_hold};
 use crate::parameters::Parameters;
 use crate::{Error, Result};
 use linear::{LinearPlant, Margins, closed_loop_poles, controller_response, frequencies, product};
@@ -29,6 +29,8 @@ pub const RANGE: f64 = 0.204;
 pub const SENSITIVITY_BOUND: f64 = 2.0;
 /// Parts of the stroke that are asked whether gains of their own would pay.
 const THIRDS: usize = 3;
+/// What the names of these parts begin with.
+const CONTRACTION: &str = "contraction";
 /// Contractions that the working range is divided into.
 const CONTRACTIONS: usize = 7;
 /// Dead time that a tuned loop bears, s.
@@ -117,6 +119,8 @@ pub struct Tuning {
     pub before: Vec<PointMargins>,
     /// What gains of its own would bring to each part of the working range.
     pub scheduling: Vec<Part>,
+    /// How many operating points the muscle cannot hold within the limits of the command; they are left out.
+    pub out_of_reach: usize,
 }
 
 /// A part of the working range with gains of its own.
@@ -124,6 +128,8 @@ pub struct Tuning {
 pub struct Part {
     /// What the part is.
     pub name: String,
+    /// Whether it is a part of the stroke; otherwise it is a load.
+    pub is_of_stroke: bool,
     /// Integral gain that it would allow, V/(m s).
     pub integral_gain: f64,
 }
@@ -136,7 +142,7 @@ impl Tuning {
 
     /// By how much gains that are scheduled over the contraction could be larger where they are smallest.
     pub fn gain_of_scheduling(&self) -> f64 {
-        let parts = self.scheduling.iter().take(THIRDS);
+        let parts = self.scheduling.iter().filter(|part| part.is_of_stroke);
         let smallest = parts.map(|part| part.integral_gain).fold(f64::INFINITY, f64::min);
         smallest / self.parameters.controller.integral_gain
     }
@@ -146,6 +152,12 @@ impl Tuning {
 pub fn worst(margins: &[PointMargins]) -> &PointMargins {
     let by_peak = |a: &&PointMargins, b: &&PointMargins| a.uncertain.sensitivity.total_cmp(&b.uncertain.sensitivity);
     margins.iter().max_by(by_peak).expect("there are operating points")
+}
+
+/// Whether the loop of a controller and the muscle that it knows is stable with the load around a contraction in m.
+pub fn is_stable(parameters: &Parameters, contraction: f64) -> bool {
+    let plant = OperatingPoint { mass: parameters.load.mass, contraction }.plant(parameters);
+    closed_loop_poles(&plant, &parameters.controller, 1.0).iter().all(|pole| pole.re < 0.0)
 }
 
 /// The operating points of the working range, by load and contraction.
@@ -196,12 +208,30 @@ impl Sampled {
     }
 }
 
-/// Tunes the controller of some parameters for a range of loads in kg.
+/// Tunes the controller of some parameters for a range of loads in kg, over that part of the working range in which the
+/// muscle can hold them.
 ///
 /// # Errors
-/// [`Error::Tuning`] where the muscle holds no position, or no gains satisfy the bound.
+/// [`Error::Tuning`] where the muscle holds no position, or no gains satisfy the bound; [`Error::OutOfRange`] for what is no load.
 pub fn tune(parameters: &Parameters, masses: &[f64]) -> Result<Tuning> {
-    let points = operating_points(parameters, masses);
+    let with_load = |mass: f64| -> Result<Parameters> {
+        let mut parameters = *parameters;
+        parameters.set("load.mass", mass)?;
+        Ok(parameters)
+    };
+    let mut points = Vec::new();
+    for point in operating_points(parameters, masses) {
+        if can_hold(&with_load(point.mass)?, point.contraction) {
+            points.push(point);
+        }
+    }
+    if let Some(mass) = masses.iter().find(|mass| points.iter().all(|point| point.mass != **mass)) {
+        let Controller { minimum_command, maximum_command, .. } = parameters.controller;
+        let problem = format!(
+            "from {minimum_command} to {maximum_command} V the muscle holds {mass} kg nowhere in its working range; try other loads"
+        );
+        return Err(Error::Tuning { problem });
+    }
     let soft = points.iter().find(|point| point.plant(parameters).natural_frequency().max(0.0) == 0.0);
     if let Some(OperatingPoint { mass, contraction }) = soft {
         let problem = format!(
@@ -220,6 +250,7 @@ pub fn tune(parameters: &Parameters, masses: &[f64]) -> Result<Tuning> {
         margins: judged(&tuned),
         before: judged(parameters),
         scheduling: scheduling(&tuned, masses, &points),
+        out_of_reach: masses.len() * CONTRACTIONS - points.len(),
     })
 }
 
@@ -231,7 +262,7 @@ fn scheduling(parameters: &Parameters, masses: &[f64], points: &[OperatingPoint]
     for k in 0..THIRDS {
         let (low, high) = (k as f64 * third, (k + 1) as f64 * third);
         let within = |p: &&OperatingPoint| p.contraction >= low - rounding && p.contraction <= high + rounding;
-        let name = format!("contraction {:.0} to {:.0} mm", 1e3 * low, 1e3 * high);
+        let name = format!("{CONTRACTION} {:.0} to {:.0} mm", 1e3 * low, 1e3 * high);
         parts.push((name, points.iter().filter(within).copied().collect()));
     }
     if masses.len() > 1 {
@@ -239,12 +270,13 @@ fn scheduling(parameters: &Parameters, masses: &[f64], points: &[OperatingPoint]
             parts.push((format!("load {mass} kg"), points.iter().filter(|p| p.mass == *mass).copied().collect()));
         }
     }
+    parts.retain(|(_, points)| !points.is_empty()); // nothing is held in the others
     let tuned = |(name, points): (String, Vec<OperatingPoint>)| {
         let (design, placement) = place(parameters, &points).ok()?;
         let own = placement.controller(&design.plant(parameters), &parameters.controller);
         // The search ends at a local optimum; a part bears what the whole does.
         let integral_gain = own.integral_gain.max(parameters.controller.integral_gain);
-        Some(Part { name, integral_gain })
+        Some(Part { is_of_stroke: name.starts_with(CONTRACTION), name, integral_gain })
     };
     parts.into_par_iter().filter_map(tuned).collect()
 }

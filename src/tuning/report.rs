@@ -58,8 +58,9 @@ pub fn to_json(tuning: &Tuning) -> Value {
         },
         "sensitivity_bound": SENSITIVITY_BOUND,
         "worst": point(tuning.worst()),
+        "out_of_reach": tuning.out_of_reach,
         "points": tuning.margins.iter().map(point).collect::<Vec<_>>(),
-        "scheduling": tuning.scheduling.iter().map(|Part { name, integral_gain }| {
+        "scheduling": tuning.scheduling.iter().map(|Part { name, integral_gain, .. }| {
             json!({ "part": name, "integral_gain": integral_gain })
         }).collect::<Vec<_>>(),
         "gain_of_scheduling": tuning.gain_of_scheduling(),
@@ -274,6 +275,7 @@ fn page(tuning: &Tuning, before: &Parameters, name: &str) -> String {
         margins_before => extremes(&tuning.before),
         points => tuning.margins.iter().map(point_row).collect::<Vec<_>>(),
         design => point_words(&tuning.design),
+        out_of_reach => tuning.out_of_reach,
         natural_frequency => short(tuning.placement.natural_frequency),
         damping_ratio => short(tuning.placement.damping_ratio),
         other_product => short(tuning.placement.other_product.sqrt()),

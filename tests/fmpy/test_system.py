@@ -80,12 +80,25 @@ def test_description_follows_the_schema(system):
     assert schema.validate(description), schema.error_log
 
 
-def test_the_loop_follows_its_reference(system):
-    result = simulate_ssp(str(system), stop_time=8.0, step_size=1e-3)
+@pytest.mark.parametrize("preset, target", [("dmsp-40-1000", 0.15), ("dmsp-40-290", 0.05)])
+def test_the_loop_follows_its_reference(sinew, tmp_path, preset, target):
+    """Each muscle a reference within its reach, as the thesis has them."""
+    assert run(sinew, "export", "--parameters", preset, "--out", tmp_path).stderr == ""
+    result = simulate_ssp(str(tmp_path / "ClosedLoop.ssp"), stop_time=8.0, step_size=1e-3)
     error = result["reference.setpoint"] - result["muscle.measured.contraction"]
-    assert result["reference.setpoint"][-1] == pytest.approx(0.15)
+    assert result["reference.setpoint"][-1] == pytest.approx(target)
     assert np.abs(error).max() < 1e-3, "the load must start at rest on the reference and stay near it"
     assert abs(error[-1]) < 1e-5
+
+
+@pytest.mark.parametrize("preset, parameters, expected", [
+    ("dmsp-40-290", {"reference.target": 0.15}, "cannot hold 20 kg at `reference.target`, 0.15 m"),
+    ("dmsp-40-1000", {"controller.integral_gain": 500.0}, "not stable with 20 kg at `reference.start`, 0 m"),
+    ("dmsp-40-1000/tondu-lopez-kq", {"load.mass": 40.0}, "cannot hold 40 kg at `reference.target`, 0.15 m"),
+])
+def test_a_loop_that_cannot_follow_is_told(sinew, tmp_path, preset, parameters, expected):
+    source = write_parameters(tmp_path / "parameters.toml", parameters, preset)
+    assert expected in run(sinew, "export", "--parameters", source, "--out", tmp_path).stderr
 
 
 def with_libcosim(system):
