@@ -46,6 +46,8 @@ pub mod plot;
 #[cfg(feature = "tool")]
 pub mod quality;
 #[cfg(feature = "tool")]
+pub mod reproduction;
+#[cfg(feature = "tool")]
 pub mod simulation;
 #[cfg(feature = "tool")]
 pub mod ssp;

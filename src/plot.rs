@@ -16,8 +16,8 @@ pub struct Curve<'a> {
 }
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito) and in print.
-const PALETTE: [RGBColor; 4] =
-    [RGBColor(40, 40, 40), RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115)];
+const PALETTE: [RGBColor; 5] =
+    [RGBColor(40, 40, 40), RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
 /// More points than this per curve are not seen.
 const MOST_POINTS: usize = 1200;
 
