@@ -120,6 +120,11 @@ pub fn both(number: &str) -> [f64; 2] {
         "3.28" => [mooney_rivlin_as_printed(&at), at.elastic(ForceModelName::MooneyRivlin)],
         "3.35" => [rubber * angle.sin(), along.abs()],
         "3.36" => [rubber * angle.cos(), around],
+        "3.37" => {
+            let thickness = at.parameters.force_models.improved_mckibben.membrane_thickness;
+            let exact = PI / 4.0 * (diameter.powi(2) - (diameter - 2.0 * thickness).powi(2));
+            [PI * diameter * thickness, exact]
+        }
         "3.40" => {
             let membrane = &at.parameters.force_models.improved_mckibben;
             let stress = membrane.modulus(length / rest_length) * along;

@@ -82,7 +82,7 @@ impl Chart {
         };
         let [x_label, y_label] = self.axes;
         let (curves, dots) = (of(false), of(true));
-        Panel { title: &self.title, x_label, y_label, curves, dots, legend: true, ..Panel::default() }
+        Panel { title: &self.title, x_label, y_label, curves, dots, legend: true, above: 0.15, ..Panel::default() }
     }
 }
 
@@ -225,8 +225,11 @@ fn stiffness(muscle: &Muscle) -> Result<Chart> {
     let mut series = Vec::new();
     for (kg, color, points) in by_load(&muscle.above.points.all) {
         let modelled = forces(&parameters, &points);
-        // At 1 bar both ranges are mixed.
-        let above = || points.iter().zip(&modelled).filter(|(point, _)| point.gauge_pressure > spring.blend_end);
+        // At 1 bar both ranges are mixed; near no stretch the stiffness has a pole.
+        let told = |point: &Point| {
+            point.gauge_pressure > spring.blend_end && stretch(point) > 0.02 * parameters.muscle.rest_length
+        };
+        let above = || points.iter().zip(&modelled).filter(|(point, _)| told(point));
         let printed = above().map(|(point, force)| (point.gauge_pressure / 1e5, 1e-3 * force / stretch(point)));
         let found = above().map(|(point, _)| (point.gauge_pressure / 1e5, 1e-3 * point.force / stretch(point)));
         series.push(Series::of(format!("{kg} kg"), color, printed));
@@ -236,10 +239,10 @@ fn stiffness(muscle: &Muscle) -> Result<Chart> {
     Ok(Chart { title: title(muscle, what), axes: ["gauge pressure [bar]", "stiffness [N/mm]"], series })
 }
 
-/// Modelled forces over pressure as dots, load after load, beside the loads.
+/// Modelled forces over pressure as dots, load after load, beside the loads; from 1 bar on.
 fn modelled(muscle: &Muscle, parameters: &Parameters, what: &str) -> Chart {
     let mut series = Vec::new();
-    for (kg, color, points) in by_load(&muscle.points) {
+    for (kg, color, points) in by_load(&muscle.above.points.all) {
         let found =
             points.iter().zip(forces(parameters, &points)).map(|(point, force)| (point.gauge_pressure / 1e5, force));
         let load = points.iter().map(|point| (point.gauge_pressure / 1e5, point.force));
@@ -262,13 +265,13 @@ fn improved(muscle: &Muscle) -> Chart {
 /// Coefficients of the one muscle in the other.
 fn crossed(basis: &Basis) -> Vec<Chart> {
     let [long, short] = &basis.muscles;
-    let chart = |of: &Muscle, on: &Muscle, what: &str| {
+    let chart = |of: &Muscle, on: &Muscle| {
         let mut parameters = on.printed;
         parameters.muscle.force_model = ForceModelName::ImprovedMcKibben;
         parameters.force_models = of.fitted(ForceModelName::ImprovedMcKibben).fitted.parameters.force_models;
-        modelled(on, &parameters, what)
+        modelled(on, &parameters, "Force with the membrane of the other muscle")
     };
-    vec![chart(long, short, "Membrane of the long muscle in"), chart(short, long, "Membrane of the short muscle in")]
+    vec![chart(long, short), chart(short, long)]
 }
 
 fn modulus(basis: &Basis) -> Result<Vec<Chart>> {
@@ -278,10 +281,13 @@ fn modulus(basis: &Basis) -> Result<Vec<Chart>> {
         let printed = Parameters::preset(&format!("{}/table-4.3", muscle.above.name))?.force_models.improved_mckibben;
         let fitted = muscle.fitted(ForceModelName::ImprovedMcKibben).fitted.parameters.force_models.improved_mckibben;
         let curve = |membrane: crate::muscle::ImprovedMcKibben| ratios().map(move |r| (r, 1e-6 * membrane.modulus(r)));
-        let series =
-            vec![Series::of("Table 4.3", 1, curve(printed)), Series::of("fitted to the forces", 2, curve(fitted))];
+        let series = vec![
+            Series::of("Table 4.3", 1, curve(printed)),
+            Series::of("fitted to reconstructed forces", 2, curve(fitted)),
+        ];
         let axes = ["L/L₀", "modulus [MPa]"];
-        charts.push(Chart { title: title(muscle, "Modulus of the membrane"), axes, series });
+        let title = format!("Modulus of the membrane, {}", muscle.above.name.to_uppercase());
+        charts.push(Chart { title, axes, series });
     }
     Ok(charts)
 }

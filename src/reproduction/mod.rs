@@ -48,6 +48,8 @@ impl Verdict {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thesis {
+    /// What a hurried reader should know, line by line.
+    pub in_short: Vec<String>,
     /// Sections of the document.
     pub section: Vec<Section>,
 }
@@ -101,6 +103,13 @@ pub struct Item {
     pub reason: Option<String>,
 }
 
+impl Item {
+    /// Share by which a number may be off.
+    pub fn within(&self) -> f64 {
+        self.within.unwrap_or(WITHIN)
+    }
+}
+
 /// A printed number.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -108,10 +117,20 @@ pub struct Value {
     /// What it is called, where there are several.
     #[serde(default)]
     pub name: String,
-    /// The number, in the unit shown.
-    pub printed: f64,
+    /// The number, in the unit shown, or what follows from printed ones.
+    pub printed: Printed,
     /// What it is compared with.
     pub quantity: Quantity,
+}
+
+/// A number, or what follows from printed numbers that a preset holds.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+pub enum Printed {
+    /// As printed.
+    Number(f64),
+    /// Computed from what is printed.
+    From(Quantity),
 }
 
 /// A number beside what comes out, in the unit shown.
@@ -146,6 +165,8 @@ pub struct Judged {
 /// All sections with their items judged, and the figures: file name and SVG.
 #[derive(Debug)]
 pub struct Reproduction {
+    /// What a hurried reader should know.
+    pub in_short: Vec<String>,
     /// Section after section.
     pub sections: Vec<(Section, Vec<Judged>)>,
     /// Figures.
@@ -168,11 +189,12 @@ pub fn reproduce(done: &(dyn Fn(&str) + Sync)) -> Result<Reproduction> {
         done(&section.title);
         Ok((section, judged))
     };
-    let sections = thesis().section.into_iter().map(of_section).collect::<Result<Vec<_>>>()?;
+    let Thesis { in_short, section } = thesis();
+    let sections = section.into_iter().map(of_section).collect::<Result<Vec<_>>>()?;
     let names: Vec<&String> = sections.iter().flat_map(|(section, _)| &section.figure).map(|(name, _)| name).collect();
     let drawn = names.par_iter().map(|name| Ok(((*name).clone(), figures::draw(name, &basis)?)));
     let figures = drawn.collect::<Result<Vec<_>>>()?;
-    Ok(Reproduction { sections, figures })
+    Ok(Reproduction { in_short, sections, figures })
 }
 
 /// How many sections [`reproduce`] tells of.
@@ -202,17 +224,20 @@ fn judge(item: &Item, basis: &Basis) -> Result<Judged> {
         numbers.push(Compared { name: String::new(), printed: Some(printed / size), computed: computed / size });
     }
     for Value { name, printed, quantity } in &item.values {
+        let printed = match printed {
+            Printed::Number(number) => *number,
+            Printed::From(quantity) => basis.value(quantity)? / size,
+        };
         let computed = basis.value(quantity)? / size;
-        numbers.push(Compared { name: name.clone(), printed: Some(*printed), computed });
+        numbers.push(Compared { name: name.clone(), printed: Some(printed), computed });
     }
     if let Some(quantity) = &item.quantity {
         numbers.push(Compared { name: String::new(), printed: None, computed: basis.value(quantity)? / size });
     }
-    let within = item.within.unwrap_or(WITHIN);
     let low = item.at_least.unwrap_or(f64::NEG_INFINITY);
     let high = item.at_most.unwrap_or(f64::INFINITY);
     let agrees = |number: &Compared| match number.printed {
-        Some(_) => number.off() <= within,
+        Some(_) => number.off() <= item.within(),
         None => (low..=high).contains(&number.computed),
     };
     let verdict = if numbers.is_empty() {

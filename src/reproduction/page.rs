@@ -42,11 +42,14 @@ fn page(found: &Reproduction) -> String {
     let mut text = INTRODUCTION.to_owned();
     let all = || found.sections.iter().flat_map(|(_, items)| items);
     let count = |verdict: Verdict| all().filter(|judged| judged.verdict == verdict).count();
-    let counts = Verdict::ALL.map(|verdict| format!("{} {}", count(verdict), verdict.words()));
+    let [holds, corrected, lost] = Verdict::ALL.map(count);
+    text += "\n## In short\n\n";
+    found.in_short.iter().for_each(|line| text += &format!("- {line}\n"));
     let _ = write!(
         text,
-        "\n## Summary\n\n{}.\n\n| | | printed | computed | verdict |\n|---|---|---|---|---|\n",
-        counts.join(", ")
+        "\n## Summary\n\n{holds} hold, {corrected} are corrected, {lost} are not reproducible. A printed number holds where it is off by \
+         less than 1 %, or what stands behind ±; a statement where the bound behind it is kept.\n\n\
+         | | | printed | computed | verdict |\n|---|---|---|---|---|\n"
     );
     for (section, items) in &found.sections {
         let _ = writeln!(text, "| **[{}](#{})** | | | | |", section.title, anchor(&section.title));
@@ -77,17 +80,38 @@ fn number(value: f64, unit: &str) -> String {
     if unit.is_empty() { text } else { format!("{text} {unit}") }
 }
 
+/// What is printed in an item with one number, and how much it may be off.
+fn printed(judged: &Judged, value: Option<f64>) -> String {
+    let item = &judged.item;
+    let Some(value) = value else {
+        let bounds = match (item.at_least, item.at_most) {
+            (Some(low), Some(high)) => format!("{} … {}", number(low, ""), number(high, &item.unit)),
+            (Some(low), None) => format!("≥ {}", number(low, &item.unit)),
+            (None, Some(high)) => format!("≤ {}", number(high, &item.unit)),
+            (None, None) => String::new(),
+        };
+        return format!("{} ({bounds})", item.says.as_deref().unwrap_or_default());
+    };
+    number(value, &item.unit) + &tolerance(judged)
+}
+
+fn tolerance(judged: &Judged) -> String {
+    judged.item.within.map_or(String::new(), |share| format!(" ± {} %", short(100.0 * share)))
+}
+
 fn row(judged: &Judged) -> String {
     let item = &judged.item;
     let (printed, computed) = match judged.numbers.as_slice() {
         [] => (String::new(), String::new()),
-        [Compared { printed: Some(printed), computed, .. }] => {
-            (number(*printed, &item.unit), number(*computed, &item.unit))
-        }
-        [Compared { computed, .. }] => (item.says.clone().unwrap_or_default(), number(*computed, &item.unit)),
+        [only] => (printed(judged, only.printed), number(only.computed, &item.unit)),
         several => {
             let worst = several.iter().map(Compared::off).fold(0.0, f64::max);
-            (format!("{} numbers", several.len()), format!("off by up to {} %", short(100.0 * worst)))
+            let off = if worst < 10.0 {
+                format!("off by up to {} %", short(100.0 * worst))
+            } else {
+                "off by orders of magnitude".to_owned()
+            };
+            (format!("{} numbers{}", several.len(), tolerance(judged)), off)
         }
     };
     let verdict = match judged.verdict {

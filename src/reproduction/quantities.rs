@@ -41,7 +41,7 @@ pub struct Muscle {
     pub printed: Parameters,
     /// All reconstructed points.
     pub points: Vec<Point>,
-    /// Those from 1 bar on, with the models fitted to them.
+    /// Those from 1 bar on where the muscle is not stretched, with the models fitted to them.
     pub above: OnMuscle,
 }
 
@@ -87,6 +87,13 @@ pub enum Quantity {
         /// Load.
         kg: f64,
     },
+    /// Force of a preset without pressure.
+    ElasticForce {
+        /// The preset.
+        preset: String,
+        /// Contraction.
+        contraction: f64,
+    },
     /// Force of a preset.
     Force {
         /// The preset.
@@ -118,7 +125,7 @@ pub enum Quantity {
         /// The value.
         beta: f64,
     },
-    /// Error of a preset's force at reconstructed points, rms in N.
+    /// Error of a preset's force at reconstructed points, rms in N; from 1 bar on where the muscle is not stretched.
     Rms {
         /// The preset, without a fit.
         preset: String,
@@ -153,6 +160,11 @@ pub enum Quantity {
         /// Whose parameters.
         muscle: String,
     },
+    /// Share at which it is too high.
+    CrossTooHigh {
+        /// Whose parameters.
+        muscle: String,
+    },
     /// The same: error, rms in N.
     CrossRms {
         /// Whose parameters.
@@ -174,6 +186,15 @@ pub enum Quantity {
         polynomial: Polynomial,
         /// Power of the contraction.
         power: usize,
+    },
+    /// Value of such a polynomial at a contraction.
+    IsometricAt {
+        /// Preset.
+        muscle: String,
+        /// Which.
+        polynomial: Polynomial,
+        /// Contraction.
+        contraction: f64,
     },
     /// Largest distance in N of an interpolated isometric point from its straight line.
     IsometricBend {
@@ -229,12 +250,12 @@ pub enum Quantity {
         /// Trajectory of Table 4.5, from 1.
         trajectory: usize,
     },
-    /// Largest excess in m of the contraction in passing over that at rest while the pressure rises, over all trajectories.
+    /// Largest excess in m of the contraction in passing over that at rest while the pressure rises.
     Lead {
         /// Load.
         kg: f64,
-        /// Lowest gauge pressure.
-        from: f64,
+        /// Last trajectory of Table 4.5 that counts, from 1.
+        last: usize,
     },
     /// Largest real part of the poles of valve, muscle and load at half the stroke, 1/s.
     OpenLoopPole {
@@ -286,7 +307,7 @@ impl Muscle {
         let recording = Recording::parse(csv.as_bytes(), Path::new(&file), &[])?;
         let points = Points::of(&[recording], 0)?;
         let mut above = points.clone();
-        above.all.retain(|point| point.gauge_pressure >= LOW);
+        above.all.retain(|point| point.gauge_pressure >= LOW && point.contraction >= 0.0);
         let models = assess_all(&MODELS, &printed, &above, &[Braid::Given]);
         let above = OnMuscle { name: preset.to_owned(), given: printed, points: above, models, effective: 0.0 };
         Ok(Self { printed, points: points.all, above })
@@ -311,6 +332,13 @@ impl Muscle {
             (x, [line[1], line[0]])
         };
         self.isometric().into_iter().map(line).collect()
+    }
+
+    /// Coefficients by rising powers of a polynomial through slopes or intercepts.
+    fn coefficients(&self, which: Polynomial) -> Vec<f64> {
+        let (column, degree) = if which == Polynomial::Area { (0, 1) } else { (1, 3) };
+        let pairs: Vec<(f64, f64)> = self.isometric_lines().iter().map(|(x, line)| (*x, line[column])).collect();
+        polynomial(&pairs, degree)
     }
 
     /// Contraction in m at which the printed virtual-area model holds a load in kg at a gauge pressure in Pa.
@@ -342,8 +370,12 @@ fn polynomial(points: &[(f64, f64)], degree: usize) -> Vec<f64> {
 /// Largest distance of points from such a polynomial.
 fn bend(points: &[(f64, f64)], degree: usize) -> f64 {
     let found = polynomial(points, degree);
-    let at = |x: f64| found.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient);
-    points.iter().map(|(x, y)| (y - at(*x)).abs()).fold(0.0, f64::max)
+    points.iter().map(|(x, y)| (y - value(&found, *x)).abs()).fold(0.0, f64::max)
+}
+
+/// Value of a polynomial.
+fn value(coefficients: &[f64], x: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
 }
 
 /// The same, over the range of the values.
@@ -412,6 +444,10 @@ impl Basis {
                 let Parameters { muscle, force_models, .. } = Parameters::preset(preset)?;
                 force_models.force(&muscle, bar * BAR, *contraction)
             }
+            Quantity::ElasticForce { preset, contraction } => {
+                let Parameters { muscle, force_models, .. } = Parameters::preset(preset)?;
+                force_models.elastic_force(&muscle, *contraction)
+            }
             Quantity::RestDiameter { muscle, turns } => {
                 let mut braid = self.muscle(muscle)?.printed.muscle;
                 braid.turns = turns.unwrap_or(braid.turns);
@@ -422,7 +458,9 @@ impl Basis {
             Quantity::AngleOfBeta { beta } => (1.0 / beta).sqrt().asin(),
             Quantity::Rms { preset, from, to } => {
                 let inside = |point: &Point| (from * BAR..=to * BAR).contains(&point.gauge_pressure);
-                let points = self.muscle(preset)?.points.iter().filter(|point| inside(point)).copied();
+                let muscle = self.muscle(preset)?;
+                let points = if from * BAR >= LOW { &muscle.above.points.all } else { &muscle.points };
+                let points = points.iter().filter(|point| inside(point)).copied();
                 errors(&Parameters::preset(preset)?, &points.collect::<Vec<_>>())
             }
             Quantity::FittedRms { muscle, model } => {
@@ -437,13 +475,12 @@ impl Basis {
             }
             Quantity::Modulus { preset, ratio } => self.membrane(preset)?.modulus(*ratio),
             Quantity::CrossTooLow { muscle } => self.cross(muscle).too_low,
+            Quantity::CrossTooHigh { muscle } => 1.0 - self.cross(muscle).too_low,
             Quantity::CrossRms { muscle } => self.cross(muscle).errors.rms,
             Quantity::Ratio { part, whole } => self.value(part)? / self.value(whole)?,
-            Quantity::Isometric { muscle, polynomial: which, power } => {
-                let lines = self.muscle(muscle)?.isometric_lines();
-                let (column, degree) = if *which == Polynomial::Area { (0, 1) } else { (1, 3) };
-                let pairs: Vec<(f64, f64)> = lines.iter().map(|(x, line)| (*x, line[column])).collect();
-                polynomial(&pairs, degree)[*power]
+            Quantity::Isometric { muscle, polynomial, power } => self.muscle(muscle)?.coefficients(*polynomial)[*power],
+            Quantity::IsometricAt { muscle, polynomial, contraction } => {
+                value(&self.muscle(muscle)?.coefficients(*polynomial), *contraction)
             }
             Quantity::IsometricBend { muscle } => {
                 let curves = self.muscle(muscle)?.isometric();
@@ -470,11 +507,11 @@ impl Basis {
                 let passages = self.passages(*kg, *trajectory)?;
                 passages.iter().map(|p| (p.dynamic - p.at_rest).abs()).fold(0.0, f64::max)
             }
-            Quantity::Lead { kg, from } => {
+            Quantity::Lead { kg, last } => {
                 let mut most = f64::NEG_INFINITY;
-                for number in 1..=TRAJECTORIES.len() {
+                for number in 1..=*last {
                     let rising = self.passages(*kg, number)?.into_iter();
-                    let rising = rising.filter(|p| p.branch == Branch::Shortening && p.gauge_pressure >= from * BAR);
+                    let rising = rising.filter(|p| p.branch == Branch::Shortening);
                     most = rising.map(|p| p.dynamic - p.at_rest).fold(most, f64::max);
                 }
                 most
