@@ -8,9 +8,9 @@ use std::collections::VecDeque;
 
 /// Instants that are closer than this, in s, count as the same: far below any step.
 const SAME_INSTANT: f64 = 1e-12;
-/// Steps of a sticking pilot that follow each other faster than this, in s, are replaced by the line through their
-/// middles: the muscle is slower by orders of magnitude.
-const FINEST_STAIR: f64 = 1e-4;
+/// A pilot that would rest for less than this, in s, before it breaks loose again does not come to rest: so a step of the
+/// command that a recording shows as a steep line ends where the step does.
+const SHORTEST_REST: f64 = 0.02;
 
 /// What a model remembers beyond its state.
 pub trait Memory: Default + Clone + Send {
@@ -209,20 +209,22 @@ impl Slack {
 struct Pilot {
     behind_play: f64,
     stuck_at: f64,
+    /// Direction in which it moves along with the command, having broken loose; 0 where it sticks.
+    moving: f64,
 }
 
 impl Pilot {
     fn at_rest(slack: &Slack, command: f64) -> Self {
         let position = command + slack.play * slack.start;
-        Self { behind_play: position, stuck_at: position }
+        Self { behind_play: position, stuck_at: position, moving: 0.0 }
     }
 
     /// Follows a line of the command, and tells the lines that come of it.
     fn follow(&mut self, slack: &Slack, line: Line, mut tell: impl FnMut(Line)) {
-        let Self { behind_play, stuck_at } = self;
+        let Self { behind_play, stuck_at, moving } = self;
         follow_with_play(behind_play, slack.play, line, |line| {
             if slack.stiction > 0.0 {
-                follow_with_stiction(stuck_at, slack.stiction, line, &mut tell);
+                follow_with_stiction(stuck_at, moving, slack.stiction, line, &mut tell);
             } else {
                 tell(line);
             }
@@ -248,29 +250,35 @@ fn follow_with_play(position: &mut f64, half_width: f64, line: Line, mut tell: i
     }
 }
 
-/// Stiction: the position stays until it is off by the threshold, and jumps to the line then.
-fn follow_with_stiction(position: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
+/// Stiction: the position stays until it is off by the threshold, and jumps to the line then. On a steep line it moves on.
+fn follow_with_stiction(position: &mut f64, moving: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
+    let (speed, direction) = (line.slope.abs(), line.slope.signum());
+    let steep = threshold < SHORTEST_REST * speed;
+    let moves_on = steep && *moving == direction;
+    *moving = if moves_on { direction } else { 0.0 };
+    if moves_on {
+        *position = line.at(line.span);
+        return tell(line);
+    }
     if (line.value - *position).abs() >= threshold {
         *position = line.value;
     }
-    let speed = line.slope.abs();
-    let direction = line.slope.signum();
     let first = if speed == 0.0 { f64::INFINITY } else { (threshold - direction * (line.value - *position)) / speed };
     if first >= line.span {
         return tell(Line { value: *position, slope: 0.0, ..line });
     }
     tell(Line { span: first, value: *position, slope: 0.0, ..line });
-    let (moving, stair) = (line.from(first), threshold / speed);
-    let jumps = (moving.span / stair).floor();
-    let landed = |jump: f64| moving.at(jump * stair);
-    if stair < FINEST_STAIR {
-        tell(Line { value: moving.value - direction * 0.5 * threshold, ..moving });
-    } else {
-        for jump in 0..=jumps as u32 {
-            let after = f64::from(jump) * stair;
-            let span = stair.min(moving.span - after);
-            tell(Line { start: moving.start + after, span, value: landed(f64::from(jump)), slope: 0.0 });
-        }
+    let (loose, stair) = (line.from(first), threshold / speed);
+    if steep {
+        (*position, *moving) = (loose.at(loose.span), direction);
+        return tell(loose);
+    }
+    let jumps = (loose.span / stair).floor();
+    let landed = |jump: f64| loose.at(jump * stair);
+    for jump in 0..=jumps as u32 {
+        let after = f64::from(jump) * stair;
+        let span = stair.min(loose.span - after);
+        tell(Line { start: loose.start + after, span, value: landed(f64::from(jump)), slope: 0.0 });
     }
     *position = landed(jumps);
 }
@@ -358,7 +366,7 @@ impl Memory for PlantMemory {
     }
 
     fn save(&self, saved: &mut Vec<f64>) {
-        let pilot = self.pilot.map(|pilot| [pilot.behind_play, pilot.stuck_at]);
+        let pilot = self.pilot.map(|pilot| [pilot.behind_play, pilot.stuck_at, pilot.moving]);
         saved.push(f64::from(u8::from(pilot.is_some())));
         saved.extend(pilot.into_iter().flatten());
         self.command.save(saved);
@@ -368,8 +376,8 @@ impl Memory for PlantMemory {
     fn load(saved: &[f64]) -> Option<Self> {
         let (pilot, rest) = match saved {
             [0.0, rest @ ..] => (None, rest),
-            [1.0, behind_play, stuck_at, rest @ ..] => {
-                (Some(Pilot { behind_play: *behind_play, stuck_at: *stuck_at }), rest)
+            [1.0, behind_play, stuck_at, moving, rest @ ..] => {
+                (Some(Pilot { behind_play: *behind_play, stuck_at: *stuck_at, moving: *moving }), rest)
             }
             _ => return None,
         };

@@ -170,7 +170,7 @@ fn results_do_not_depend_on_the_communication_step() {
             for steps in [3, 40] {
                 for (coarse, fine) in coarse.iter().zip(course(steps)) {
                     for (output, (coarse, fine)) in coarse.iter().zip(&fine).enumerate() {
-                        let close = (coarse - fine).abs() <= 2e-5 * coarse.abs().max(1e-2);
+                        let close = (coarse - fine).abs() <= 4e-5 * coarse.abs().max(1e-2);
                         assert!(close, "output {output}, {steps} steps: {coarse} {fine}");
                     }
                 }
@@ -208,7 +208,7 @@ fn a_saved_memory_that_cannot_be_is_refused() {
         }
         // The end of the fixed part: whether there is a pilot, and after it the number of pieces.
         for (position, value) in
-            [(fixed - 3, 2.0), (fixed, 1e9), (fixed, 0.5), (fixed, -1.0), (saved.len() - 1, f64::NAN)]
+            [(fixed - 3, 2.0), (fixed + 1, 1e9), (fixed + 1, 0.5), (fixed + 1, -1.0), (saved.len() - 1, f64::NAN)]
         {
             let mut damaged = saved.clone();
             damaged[position] = value;

@@ -188,8 +188,8 @@ impl<'a, 'b> Search<'a, 'b> {
         sorted(starts.into_par_iter().filter_map(best).collect())
     }
 
-    /// The same, the best of them with their last effect refined and fitted to the end: what a fit left undone would
-    /// else be credited to the next effect. Where the very best leaves nothing to look for, only those that may rival it are.
+    /// The same, the best of them with their last effect, and the very best with all of its effects, refined and fitted to the
+    /// end: what a fit left undone would else be credited to the next effect. Where the very best leaves nothing to look for, only those that may rival it are.
     fn refined_best(&self, mut judged: Vec<Judged>) -> Vec<Judged> {
         let mut rest = judged.split_off(BEAM.min(judged.len()));
         let mut others = judged.into_iter();
@@ -197,7 +197,10 @@ impl<'a, 'b> Search<'a, 'b> {
         let is_enough = self.is_enough(&best.fitted.losses);
         let (close, behind): (Vec<_>, Vec<_>) = others.partition(|other| !is_enough || other.explained > MAY_RIVAL);
         rest.extend(behind);
-        let refined = close.into_par_iter().map(|judged| self.finished(self.refined(judged)));
+        let refined = close.into_par_iter().map(|judged| {
+            let last = judged.fitted.hypothesis.parts.len() - 1;
+            self.finished(self.part_refined(judged, last))
+        });
         sorted(refined.chain([best]).chain(rest).collect())
     }
 
@@ -206,23 +209,32 @@ impl<'a, 'b> Search<'a, 'b> {
         self.bench.exact_fit(hypothesis, parameters, Scope::All).map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// The hypothesis with refinements of its last effect free, one of them or all, where the data pay for them.
+    /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
+    /// for them. What hid a refinement of an earlier effect may have been the last one.
     fn refined(&self, judged: Judged) -> Judged {
+        let parts = (0..judged.fitted.hypothesis.parts.len()).rev();
+        parts.fold(judged, |judged, which| self.part_refined(judged, which))
+    }
+
+    fn part_refined(&self, judged: Judged, which: usize) -> Judged {
         let nothing_left = beyond_noise(&judged.fitted.losses).values().all(|left| *left <= NEGLIGIBLE);
-        let Some(last) = judged.fitted.hypothesis.parts.last().filter(|_| !nothing_left) else { return judged };
-        let each = (0..last.effect.refinements.len()).map(Refined::By);
+        let part = judged.fitted.hypothesis.parts[which];
+        if nothing_left || part.refined != Refined::Not {
+            return judged;
+        }
+        let each = (0..part.effect.refinements.len()).map(Refined::By);
         let refined = each.chain([Refined::Fully]).collect::<Vec<_>>().into_par_iter();
-        let better = refined.filter_map(|refined| self.refined_by(&judged, refined));
+        let better = refined.filter_map(|refined| self.refined_by(&judged, which, refined));
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
-    fn refined_by(&self, judged: &Judged, refined: Refined) -> Option<Judged> {
+    fn refined_by(&self, judged: &Judged, which: usize, refined: Refined) -> Option<Judged> {
         let mut hypothesis = judged.fitted.hypothesis.clone();
-        let last = hypothesis.parts.last_mut()?;
-        let known: Vec<&str> = last.freed().map(|(name, _)| *name).collect();
-        last.refined = refined;
+        let part = &mut hypothesis.parts[which];
+        let known: Vec<&str> = part.freed().map(|(name, _)| *name).collect();
+        part.refined = refined;
         let mut start = judged.fitted.parameters;
-        for (name, values) in last.freed().filter(|(name, _)| !known.contains(name)) {
+        for (name, values) in part.freed().filter(|(name, _)| !known.contains(name)) {
             start.set(name, values[0]).ok()?;
         }
         Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))

@@ -41,7 +41,10 @@ impl Effect for ContractionSensorOffset {
         reference: "definition",
         of_load: false,
         forms: &[&[("contraction_sensor_offset.offset", &[5e-3, -5e-3])]],
-        refinements: &[("contraction_sensor_offset.settling_share", &[0.3]), ("contraction_sensor_offset.settling_time", &[5.0])],
+        refinements: &[
+            ("contraction_sensor_offset.settling_share", &[0.3]),
+            ("contraction_sensor_offset.settling_time", &[5.0]),
+        ],
     };
 
     fn is_neutral(&self) -> bool {

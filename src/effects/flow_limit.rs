@@ -10,7 +10,7 @@ crate::variables::variables! {
     /// The rate r of pressure becomes r / (1 + |r/m|ⁿ)^(1/n), n = 1/`roundness`; for zero roundness it is clipped at m.
     /// The limit m is `filling` or `emptying`; the latter changes with absolute pressure by the share
     /// `emptying_with_pressure` c, m (1 − c + c (p + 1 bar)/3 bar), and both shrink with the volume,
-    /// m / (1 + `volume_growth` x/0.1 m).
+    /// m / (1 + `volume_growth` x/0.1 m), and grow with what is missing, m (|p_target − p|/1 bar)^e, `exponent` e.
     ///
     /// # In the data
     /// After large steps the pressure rises along a ramp whose slope does not depend on the size of the step, and falls
@@ -18,7 +18,8 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// A stand-in for ISO 6358: choked inflow gives a constant rate, choked outflow one in proportion to absolute
-    /// pressure; the exponent in between is no physical constant.
+    /// pressure; the roundness in between is no physical constant. A long narrow hose with turbulent flow lets through what
+    /// goes with the root of the difference in pressure, `exponent` 0.5.
     ///
     /// # Reference
     /// ISO 6358-1:2013, Pneumatic fluid power; deviation: rates instead of conductances.
@@ -33,8 +34,13 @@ crate::variables::variables! {
         emptying_with_pressure: f64 = 0.0, ONE, (0.0..=1.0);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
+        /// Power of the missing pressure, in bar, with which the limits grow
+        exponent: f64 = 0.0, ONE, (0.0..=1.0);
     }
 }
+
+/// Pressure in Pa that is taken to be missing at least; not physical, it keeps a limit that goes with it above zero.
+const LEAST_MISSING: f64 = 10.0;
 
 impl FlowLimit {
     fn limit(&self, at: &Point, rate: f64) -> f64 {
@@ -44,7 +50,12 @@ impl FlowLimit {
             let absolute = (at.gauge_pressure + AMBIENT_PRESSURE) / (REFERENCE_PRESSURE + AMBIENT_PRESSURE);
             self.emptying * (1.0 + self.emptying_with_pressure * (absolute - 1.0))
         };
-        most / (1.0 + self.volume_growth * at.relative_contraction()).max(0.1)
+        let most = most / (1.0 + self.volume_growth * at.relative_contraction()).max(0.1);
+        if self.exponent == 0.0 {
+            return most;
+        }
+        let missing = (at.target_pressure - at.gauge_pressure).abs() + LEAST_MISSING;
+        most * (missing / 1e5).powf(self.exponent)
     }
 }
 
@@ -64,11 +75,18 @@ impl Effect for FlowLimit {
                 ("flow_limit.emptying", &[0.5e5, 1.2e5, 3e5]),
                 ("flow_limit.roundness", &[0.5]),
             ],
+            &[
+                ("flow_limit.filling", &[0.5e5, 1.2e5, 3e5]),
+                ("flow_limit.emptying", &[0.5e5, 1.2e5, 3e5]),
+                ("flow_limit.roundness", &[0.5]),
+                ("flow_limit.exponent", &[0.5]),
+            ],
         ],
         refinements: &[
             ("flow_limit.roundness", &[0.3]),
             ("flow_limit.emptying_with_pressure", &[0.3]),
             ("flow_limit.volume_growth", &[0.2]),
+            ("flow_limit.exponent", &[0.3]),
         ],
     };
 

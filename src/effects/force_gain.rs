@@ -1,10 +1,10 @@
-use super::{Description, Effect};
+use super::{Description, Effect, REFERENCE_FORCE, scaled};
 
 crate::variables::variables! {
     /// A muscle that is stronger or weaker as a whole.
     ///
     /// # Model
-    /// F_static ← F_static (1 + g): `relative_error` g.
+    /// F_static ← F_static (1 + g + b (F_static/400 N − 1)): `relative_error` g, `bend` b where it changes with the force.
     ///
     /// # In the data
     /// The force residual is in proportion to the force, whatever pressure and contraction; the motion goes with it,
@@ -18,6 +18,8 @@ crate::variables::variables! {
     pub struct ForceGain in "force_gain." as Tunable {
         /// Relative error of the static force
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
+        /// Change of the gain per 400 N away from 400 N: threads that stretch
+        bend: f64 = 0.0, ONE, (-0.05..=0.05);
     }
 }
 
@@ -25,21 +27,21 @@ impl Effect for ForceGain {
     const DESCRIPTION: Description = Description {
         name: "force_gain",
         meaning: "the whole force is scaled: wrong bore, ageing",
-        equation: "F_static <- F_static (1 + g)",
+        equation: "F_static <- F_static (1 + g + b (F_static/400 N - 1))",
         signature: "force residual in proportion to the force, and the motion with it",
         experiment: "two known masses, static and dynamic",
         reference: "definition",
         of_load: false,
         forms: &[&[("force_gain.relative_error", &[0.08, -0.08])]],
-        refinements: &[],
+        refinements: &[("force_gain.bend", &[0.005])],
     };
 
     fn is_neutral(&self) -> bool {
-        self.relative_error == 0.0
+        self.relative_error == 0.0 && self.bend == 0.0
     }
 
     fn static_force(&self, force: f64) -> f64 {
-        force * (1.0 + self.relative_error)
+        scaled(force, self.relative_error, self.bend, REFERENCE_FORCE)
     }
 
     fn sentence(&self) -> String {

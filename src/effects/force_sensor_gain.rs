@@ -1,23 +1,25 @@
-use super::{Description, Effect, Readings};
+use super::{Description, Effect, REFERENCE_FORCE, Readings, scaled};
 
 crate::variables::variables! {
     /// A force sensor whose scale is off.
     ///
     /// # Model
-    /// F_measured ← F_measured (1 + g): `relative_error` g.
+    /// F_measured ← F_measured (1 + g + b (F_measured/400 N − 1)): `relative_error` g, `bend` b.
     ///
     /// # In the data
     /// The residual of the force is in proportion to the force, while the motion is as nominal; with a gain of the muscle the
     /// motion follows.
     ///
     /// # Validity
-    /// Constant over a recording.
+    /// Constant over a recording; slightly bent scales.
     ///
     /// # Reference
-    /// Definition of a gain.
+    /// Definition of a gain; linearity errors in data sheets of sensors (up to 1 % of full scale).
     pub struct ForceSensorGain in "force_sensor_gain." as Tunable {
         /// Relative error of the force sensor
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
+        /// Change of the scale per 400 N away from 400 N
+        bend: f64 = 0.0, ONE, (-0.1..=0.1);
     }
 }
 
@@ -25,21 +27,21 @@ impl Effect for ForceSensorGain {
     const DESCRIPTION: Description = Description {
         name: "force_sensor_gain",
         meaning: "the scale of the force sensor is off",
-        equation: "F_measured <- F_measured (1 + g)",
+        equation: "F_measured <- F_measured (1 + g + b (F_measured/400 N - 1))",
         signature: "residual of the force in proportion to it",
         experiment: "hang two known masses on the sensor",
         reference: "definition",
         of_load: false,
         forms: &[&[("force_sensor_gain.relative_error", &[0.05, -0.05])]],
-        refinements: &[],
+        refinements: &[("force_sensor_gain.bend", &[0.005])],
     };
 
     fn is_neutral(&self) -> bool {
-        self.relative_error == 0.0
+        self.relative_error == 0.0 && self.bend == 0.0
     }
 
     fn readings(&self, readings: Readings) -> Readings {
-        Readings { force: readings.force * (1.0 + self.relative_error), ..readings }
+        Readings { force: scaled(readings.force, self.relative_error, self.bend, REFERENCE_FORCE), ..readings }
     }
 
     fn sentence(&self) -> String {

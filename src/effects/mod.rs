@@ -39,8 +39,21 @@ impl Point {
 pub const REFERENCE_PRESSURE: f64 = 2e5;
 /// Contraction in m at which sizes that change with contraction are stated.
 pub const REFERENCE_CONTRACTION: f64 = 0.1;
+/// Force in N at which sizes that change with force are stated.
+pub const REFERENCE_FORCE: f64 = 400.0;
 /// Ambient pressure in Pa, for what depends on absolute pressure.
 pub const AMBIENT_PRESSURE: f64 = 1e5;
+
+/// A value on a scale that is off by a share, and bent: by so much more at twice the middle of the scale.
+fn scaled(value: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
+    value * (1.0 + relative_error + bend * (value / middle - 1.0))
+}
+
+/// The value that [`scaled`] made a reading of: the root of a quadratic that is near to the reading.
+fn unscaled(reading: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
+    let slope = 1.0 + relative_error - bend;
+    2.0 * reading / (slope + (slope * slope + 4.0 * bend / middle * reading).max(0.0).sqrt())
+}
 
 /// What the sensors show.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -31,7 +31,7 @@ impl Effect for PayloadMass {
         reference: "thesis eq. 5.4",
         of_load: true,
         forms: &[&[("payload_mass.additional_mass", &[2.0, -2.0])], &[("payload_mass.relative_error", &[0.1, -0.1])]],
-        refinements: &[],
+        refinements: &[("payload_mass.additional_mass", &[0.5]), ("payload_mass.relative_error", &[0.02])],
     };
 
     fn is_neutral(&self) -> bool {

@@ -1,23 +1,25 @@
-use super::{Description, Effect, Readings};
+use super::{Description, Effect, REFERENCE_PRESSURE, Readings, scaled, unscaled};
 
 crate::variables::variables! {
     /// A pressure sensor whose scale is off.
     ///
     /// # Model
-    /// p_measured ← p_measured (1 + g): `relative_error` g.
+    /// p_measured ← p_measured (1 + g + b (p_measured/2 bar − 1)): `relative_error` g, `bend` b.
     ///
     /// # In the data
     /// The residual of the pressure is in proportion to the pressure with a force that fits the command; with a gain of the
     /// valve the force follows the pressure.
     ///
     /// # Validity
-    /// Constant over a recording.
+    /// Constant over a recording; slightly bent scales.
     ///
     /// # Reference
-    /// Definition of a gain.
+    /// Definition of a gain; linearity errors in data sheets of sensors (up to 1 % of full scale).
     pub struct PressureSensorGain in "pressure_sensor_gain." as Tunable {
         /// Relative error of the pressure sensor
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
+        /// Change of the scale per 2 bar away from 2 bar
+        bend: f64 = 0.0, ONE, (-0.1..=0.1);
     }
 }
 
@@ -25,25 +27,28 @@ impl Effect for PressureSensorGain {
     const DESCRIPTION: Description = Description {
         name: "pressure_sensor_gain",
         meaning: "the scale of the pressure sensor is off",
-        equation: "p_measured <- p_measured (1 + g)",
+        equation: "p_measured <- p_measured (1 + g + b (p_measured/2 bar - 1))",
         signature: "residual of the pressure in proportion to it",
         experiment: "compare with a second gauge at two pressures",
         reference: "definition",
         of_load: false,
         forms: &[&[("pressure_sensor_gain.relative_error", &[0.05, -0.05])]],
-        refinements: &[],
+        refinements: &[("pressure_sensor_gain.bend", &[0.005])],
     };
 
     fn is_neutral(&self) -> bool {
-        self.relative_error == 0.0
+        self.relative_error == 0.0 && self.bend == 0.0
     }
 
     fn readings(&self, readings: Readings) -> Readings {
-        Readings { gauge_pressure: readings.gauge_pressure * (1.0 + self.relative_error), ..readings }
+        Readings {
+            gauge_pressure: scaled(readings.gauge_pressure, self.relative_error, self.bend, REFERENCE_PRESSURE),
+            ..readings
+        }
     }
 
     fn true_pressure(&self, reading: f64, _time: f64) -> f64 {
-        reading / (1.0 + self.relative_error)
+        unscaled(reading, self.relative_error, self.bend, REFERENCE_PRESSURE)
     }
 
     fn sentence(&self) -> String {

@@ -42,7 +42,10 @@ impl Effect for PressureSensorOffset {
         reference: "definition",
         of_load: false,
         forms: &[&[("pressure_sensor_offset.offset", &[1e4, -1e4])]],
-        refinements: &[("pressure_sensor_offset.settling_share", &[0.3]), ("pressure_sensor_offset.settling_time", &[5.0])],
+        refinements: &[
+            ("pressure_sensor_offset.settling_share", &[0.3]),
+            ("pressure_sensor_offset.settling_time", &[5.0]),
+        ],
     };
 
     fn is_neutral(&self) -> bool {

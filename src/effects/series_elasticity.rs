@@ -1,7 +1,4 @@
-use super::{Description, Effect, Readings};
-
-/// Pull in N at which the compliance is stated when it depends on the pull.
-const REFERENCE_FORCE: f64 = 400.0;
+use super::{Description, Effect, REFERENCE_FORCE, Readings};
 
 crate::variables::variables! {
     /// Something in series with the muscle that stretches: a cable, a fitting, the frame.

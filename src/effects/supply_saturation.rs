@@ -7,14 +7,16 @@ crate::variables::variables! {
     /// A supply whose pressure is too low for the command.
     ///
     /// # Model
-    /// p_target ← min(p_target, p_s − d max(p_target − p, 0)): `gauge_pressure` p_s of the supply, its `droop` d while
-    /// it fills the muscle. With `rounding` r the minimum is r-soft: p_target − r ln(1 + exp((p_target − ceiling)/r)).
+    /// p_target ← min(p_target, p_s − f t − d max(p_target − p, 0)): `gauge_pressure` p_s of the supply at the start, its
+    /// `fall` f over time t, its `droop` d while it fills the muscle. With `rounding` r the minimum is r-soft:
+    /// p_target − r ln(1 + exp((p_target − ceiling)/r)).
     ///
     /// # In the data
     /// The pressure residual is zero below a ceiling and grows one to one with the command above it.
     ///
     /// # Validity
-    /// A supply of constant pressure behind a regulator, or with a droop in proportion to what the muscle lacks.
+    /// A supply of constant pressure behind a regulator, or with a droop in proportion to what the muscle lacks, or a tank
+    /// that others empty steadily.
     ///
     /// # Reference
     /// Definition of saturation; droop as in data sheets of pressure regulators (0.5 to 1.75 bar).
@@ -25,31 +27,50 @@ crate::variables::variables! {
         rounding: f64 = 0.0, PASCAL, (0.0..=1e5);
         /// Loss of supply pressure per pressure that the muscle lacks
         droop: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Loss of supply pressure per time, of a tank that empties or a line that others use more and more
+        fall: f64 = 0.0, PASCAL_PER_SECOND, (-1e4..=1e5);
     }
 }
+
+/// A ceiling shows only between the highest target and what a muscle rests at: the starts are close, in Pa.
+#[rustfmt::skip]
+const CEILINGS: &[f64] = &[
+    0.80e5, 0.90e5, 1.00e5, 1.10e5, 1.20e5, 1.30e5, 1.40e5, 1.50e5, 1.60e5, 1.70e5,
+    1.80e5, 1.90e5, 2.00e5, 2.15e5, 2.30e5, 2.45e5, 2.60e5, 2.75e5, 2.90e5, 3.10e5,
+    3.30e5, 3.50e5, 3.70e5, 3.95e5, 4.20e5, 4.50e5, 4.80e5, 5.10e5, 5.40e5, 5.80e5,
+];
 
 impl Effect for SupplySaturation {
     const DESCRIPTION: Description = Description {
         name: "supply_saturation",
         meaning: "the supply pressure is too low for the command",
-        equation: "p_target <- min(p_target, p_s - d max(p_target - p, 0))",
+        equation: "p_target <- min(p_target, p_s - f t - d max(p_target - p, 0))",
         signature: "pressure residual above a ceiling only",
         experiment: "record the supply pressure; raise it",
         reference: "definition",
         of_load: false,
-        forms: &[&[("supply_saturation.gauge_pressure", &[1.5e5, 2.5e5, 3.5e5, 4.5e5])]],
-        refinements: &[("supply_saturation.rounding", &[3e3]), ("supply_saturation.droop", &[0.01, 0.1])],
+        forms: &[&[("supply_saturation.gauge_pressure", CEILINGS)]],
+        refinements: &[
+            ("supply_saturation.rounding", &[3e3]),
+            ("supply_saturation.droop", &[0.01, 0.1]),
+            ("supply_saturation.fall", &[300.0]),
+        ],
     };
+    const STATE_SCALES: &'static [f64] = &[1e4];
 
     fn is_neutral(&self) -> bool {
         self.gauge_pressure >= NONE
     }
 
-    fn target_pressure(&self, at: &Point, _own: &[f64], target: f64) -> f64 {
+    fn rates(&self, _at: &Point, _own: &[f64], rates: &mut [f64]) {
+        rates[0] = self.fall;
+    }
+
+    fn target_pressure(&self, at: &Point, own: &[f64], target: f64) -> f64 {
         if self.is_neutral() {
             return target;
         }
-        let ceiling = self.gauge_pressure - self.droop * (target - at.gauge_pressure).max(0.0);
+        let ceiling = self.gauge_pressure - own[0] - self.droop * (target - at.gauge_pressure).max(0.0);
         let excess = target - ceiling;
         if self.rounding == 0.0 || excess.abs() > 40.0 * self.rounding {
             return target.min(ceiling);
@@ -58,6 +79,11 @@ impl Effect for SupplySaturation {
     }
 
     fn sentence(&self) -> String {
-        format!("The supply gives no more than {:.2} bar.", self.gauge_pressure * 1e-5)
+        let falling = if self.fall == 0.0 {
+            String::new()
+        } else {
+            format!(" at first, and {:.3} bar less each minute", 60e-5 * self.fall)
+        };
+        format!("The supply gives no more than {:.2} bar{falling}.", self.gauge_pressure * 1e-5)
     }
 }

@@ -14,8 +14,8 @@ crate::variables::variables! {
     /// (play), or steps of one size (stiction). Unlike hysteresis of the muscle it is in the pressure.
     ///
     /// # Validity
-    /// Exact for a command of straight lines. A sticking pilot that jumps more than 10⁴ times per second moves along the
-    /// mean of its stairs.
+    /// Exact for a command of straight lines. A sticking pilot that would rest for less than 20 ms between its jumps moves
+    /// along with the command until that slows down, so that a step of the command is one jump.
     ///
     /// # Reference
     /// M. Choudhury, N. Thornhill, S. Shah (2005), Modelling valve stiction, doi 10.1016/j.conengprac.2004.05.005.
@@ -34,6 +34,8 @@ crate::variables::variables! {
 /// Every jump depends on the ones before, so that the error of a fit has many minima: the starts are close, in V.
 #[rustfmt::skip]
 const STICTION_STARTS: &[f64] = &[
+    0.010, 0.011, 0.012, 0.013, 0.014, 0.015, 0.016, 0.017, 0.018, 0.020,
+    0.021, 0.023, 0.024, 0.026, 0.028,
     0.030, 0.032, 0.035, 0.037, 0.040, 0.043, 0.047, 0.050, 0.054, 0.058,
     0.062, 0.067, 0.072, 0.078, 0.083, 0.090, 0.097, 0.104, 0.112, 0.120,
     0.129, 0.139, 0.150, 0.161, 0.173, 0.187, 0.201, 0.216, 0.232, 0.250,

@@ -3,13 +3,17 @@ use super::{Description, Effect, Point};
 /// The time constant stays above this share of what it is at the reference pressure.
 const LEAST_SHARE: f64 = 0.05;
 
+/// Shortest time constant of a pole of its own, s: it keeps the integrator from tiny steps.
+const SHORTEST: f64 = 1e-4;
+
 crate::variables::variables! {
     /// A valve that follows more slowly than nominal.
     ///
     /// # Model
     /// 1/ω ← 1/ω + τ (1 + g (p/p₀ − 1)), times 1 + e while emptying: `time_constant` τ at p₀ = 2 bar, its
     /// `growth_with_pressure` g, `emptying_excess` e. A hose or pilot stage before the valve is a pole of its own:
-    /// τ₂ dq/dt = p_target − q, and the valve goes for q: `second_time_constant` τ₂.
+    /// τ₂ dq/dt = p_target − q, and the valve goes for q: `second_time_constant` τ₂; with both, one after the other,
+    /// `third_time_constant` τ₃.
     ///
     /// # In the data
     /// The pressure residual is in proportion to the rate of pressure and vanishes when the command is slow; steps of
@@ -25,6 +29,8 @@ crate::variables::variables! {
         time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
         /// Time constant of a second pole before the valve
         second_time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
+        /// Time constant of a third pole, after the second
+        third_time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
         /// Relative change of the additional time constant from 0 to 2 bar
         growth_with_pressure: f64 = 0.0, ONE, (-0.9..=3.0);
         /// Relative excess of the additional time constant while emptying
@@ -36,7 +42,7 @@ impl Effect for ValveLag {
     const DESCRIPTION: Description = Description {
         name: "valve_lag",
         meaning: "the valve is slower than nominal",
-        equation: "1/w <- 1/w + tau (1 + g (p/p0 - 1));  tau2 dq/dt = p_target - q",
+        equation: "1/w <- 1/w + tau (1 + g (p/p0 - 1));  tau2 dq/dt = p_target - q;  tau3 dr/dt = q - r",
         signature: "pressure residual in proportion to the rate of pressure, gone when slow",
         experiment: "steps of several sizes with pressure recorded",
         reference: "thesis eq. 5.3",
@@ -45,28 +51,37 @@ impl Effect for ValveLag {
         refinements: &[
             ("valve_lag.time_constant", &[0.02]),
             ("valve_lag.second_time_constant", &[0.02]),
+            ("valve_lag.third_time_constant", &[0.02]),
             ("valve_lag.growth_with_pressure", &[0.2, -0.2]),
             ("valve_lag.emptying_excess", &[0.2]),
         ],
     };
-    const STATE_SCALES: &'static [f64] = &[1e5];
+    const STATE_SCALES: &'static [f64] = &[1e5, 1e5];
 
     fn is_neutral(&self) -> bool {
-        self.time_constant == 0.0 && self.second_time_constant == 0.0
+        self.time_constant == 0.0 && self.second_time_constant == 0.0 && self.third_time_constant == 0.0
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {
-        own[0] = at.gauge_pressure;
+        own.fill(at.gauge_pressure);
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
+        let second = if self.second_time_constant == 0.0 { at.commanded_pressure } else { own[0] };
         if self.second_time_constant > 0.0 {
-            rates[0] = (at.commanded_pressure - own[0]) / self.second_time_constant.max(1e-4);
+            rates[0] = (at.commanded_pressure - own[0]) / self.second_time_constant.max(SHORTEST);
+        }
+        if self.third_time_constant > 0.0 {
+            rates[1] = (second - own[1]) / self.third_time_constant.max(SHORTEST);
         }
     }
 
     fn target_pressure(&self, _at: &Point, own: &[f64], target: f64) -> f64 {
-        if self.second_time_constant == 0.0 { target } else { own[0] }
+        match (self.second_time_constant, self.third_time_constant) {
+            (0.0, 0.0) => target,
+            (_, 0.0) => own[0],
+            _ => own[1],
+        }
     }
 
     fn valve_bandwidth(&self, at: &Point, bandwidth: f64) -> f64 {
@@ -79,16 +94,15 @@ impl Effect for ValveLag {
     }
 
     fn sentence(&self) -> String {
-        let (longer, second) = (self.time_constant * 1e3, self.second_time_constant * 1e3);
-        if self.second_time_constant == 0.0 {
-            format!("The valve is slower than nominal: its time constant is {longer:.0} ms longer.")
-        } else if self.time_constant == 0.0 {
-            format!("The valve is slower than nominal: a second delay of first order, {second:.0} ms, comes before it.")
-        } else {
-            format!(
-                "The valve is slower than nominal: its time constant is {longer:.0} ms longer, and a second delay \
-                     of first order, {second:.0} ms, comes before it."
-            )
-        }
+        let longer = format!("its time constant is {:.0} ms longer", 1e3 * self.time_constant);
+        let before =
+            |what: &str, time: f64| format!("a {what} delay of first order, {:.0} ms, comes before it", 1e3 * time);
+        let parts = [
+            (self.time_constant, longer),
+            (self.second_time_constant, before("second", self.second_time_constant)),
+            (self.third_time_constant, before("third", self.third_time_constant)),
+        ];
+        let said: Vec<String> = parts.into_iter().filter(|(time, _)| *time != 0.0).map(|(_, words)| words).collect();
+        format!("The valve is slower than nominal: {}.", said.join(", and "))
     }
 }

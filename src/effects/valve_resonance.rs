@@ -4,9 +4,9 @@ crate::variables::variables! {
     /// A valve of second order, which overshoots.
     ///
     /// # Model
-    /// d²p/dt² = ω² e (1 + k tanh(|e|/1 bar)) − 2 ζ ω dp/dt, e = p_target − p, in place of the first-order valve:
+    /// d²q/dt² = ω² e (1 + k tanh(|e|/1 bar)) − 2 ζ ω dq/dt, e = p_target − q, in place of the first-order valve:
     /// `natural_frequency` ω, `damping_ratio` ζ, `stiffening` k with the size of the error. There is no resonance at
-    /// ω = 0.
+    /// ω = 0. The pressure is q itself, or follows it as a main stage follows its pilot, τ dp/dt = q − p, `main_stage` τ.
     ///
     /// # In the data
     /// The pressure rings after a step; its gain exceeds one near ω.
@@ -23,8 +23,13 @@ crate::variables::variables! {
         damping_ratio: f64 = 0.4, ONE, (0.02..=0.8);
         /// Relative growth of the stiffness with errors far beyond 1 bar
         stiffening: f64 = 0.0, ONE, (-0.5..=2.0);
+        /// Time constant of a main stage behind the pilot that rings; none at zero
+        main_stage: f64 = 0.0, SECOND, (0.0..=1.0);
     }
 }
+
+/// Time constant in s below which a main stage shows nothing.
+const SHORTEST: f64 = 1e-3;
 
 /// Error in Pa at which most of the stiffening has come.
 const LARGE_ERROR: f64 = 1e5;
@@ -33,18 +38,23 @@ impl Effect for ValveResonance {
     const DESCRIPTION: Description = Description {
         name: "valve_resonance",
         meaning: "the valve is of second order and overshoots",
-        equation: "d2p/dt2 = w^2 (p_target - p) - 2 zeta w dp/dt",
+        equation: "d2q/dt2 = w^2 (p_target - q) - 2 zeta w dq/dt;  p = q, or tau dp/dt = q - p",
         signature: "overshoot and ringing of the pressure after steps",
         experiment: "steps, and sines of two amplitudes around the natural frequency",
         reference: "definition",
         of_load: false,
-        forms: &[&[
-            ("valve_resonance.damping_ratio", &[0.3, 0.5]),
-            ("valve_resonance.natural_frequency", &[20.0, 35.0]),
-        ]],
+        forms: &[
+            &[("valve_resonance.damping_ratio", &[0.3, 0.5]), ("valve_resonance.natural_frequency", &[20.0, 35.0])],
+            &[
+                ("valve_resonance.damping_ratio", &[0.2, 0.4]),
+                ("valve_resonance.natural_frequency", &[20.0, 35.0]),
+                ("valve_resonance.main_stage", &[0.06]),
+            ],
+        ],
         refinements: &[("valve_resonance.stiffening", &[0.2])],
     };
-    const STATE_SCALES: &'static [f64] = &[1e6];
+    // Rate of the pilot, and how far it is ahead of the pressure.
+    const STATE_SCALES: &'static [f64] = &[1e6, 1e4];
 
     fn is_neutral(&self) -> bool {
         self.natural_frequency == 0.0
@@ -52,15 +62,19 @@ impl Effect for ValveResonance {
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let frequency = self.natural_frequency;
-        let mut error = at.target_pressure - at.gauge_pressure;
+        let mut error = at.target_pressure - at.gauge_pressure - own[1];
         if self.stiffening != 0.0 {
             error *= 1.0 + self.stiffening * (error.abs() / LARGE_ERROR).tanh();
         }
         rates[0] = frequency * (frequency * error - 2.0 * self.damping_ratio * own[0]);
+        rates[1] = if self.main_stage < SHORTEST { 0.0 } else { own[0] - own[1] / self.main_stage };
     }
 
     fn pressure_rate(&self, _at: &Point, own: &[f64], rate: f64) -> f64 {
-        if self.is_neutral() { rate } else { own[0] }
+        if self.is_neutral() {
+            return rate;
+        }
+        if self.main_stage < SHORTEST { own[0] } else { own[1] / self.main_stage }
     }
 
     fn sentence(&self) -> String {

@@ -9,8 +9,8 @@ crate::variables::variables! {
     /// Viscous damping beyond the nominal one, different for shortening and lengthening.
     ///
     /// # Model
-    /// F ← F − B v |v/v₀|ᵃ, with B = `contraction` for v > 0 and `extension` for v < 0, stated at v₀ = 0.05 m/s, and
-    /// `exponent` a.
+    /// F ← F − B v |v/v₀|ᵃ (1 + b (p/2 bar − 1) + c (x/0.1 m − 1)), with B = `contraction` for v > 0 and `extension` for
+    /// v < 0, stated at v₀ = 0.05 m/s, 2 bar and 0.1 m; `exponent` a, `with_pressure` b, `with_contraction` c.
     ///
     /// # In the data
     /// A loop of the force residual that grows with speed; the same triangle at three speeds separates it from dry
@@ -30,6 +30,10 @@ crate::variables::variables! {
         extension: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-80.0..=1e4);
         /// Growth of the additional damping with speed: 0 none, 1 in proportion
         exponent: f64 = 0.0, ONE, (-0.9..=2.0);
+        /// Relative growth of the additional damping with pressure, at 2 bar
+        with_pressure: f64 = 0.0, ONE, (-1.0..=1.0);
+        /// Relative growth of the additional damping with contraction, at 0.1 m
+        with_contraction: f64 = 0.0, ONE, (-1.0..=1.0);
     }
 }
 
@@ -37,13 +41,17 @@ impl Effect for ViscousDamping {
     const DESCRIPTION: Description = Description {
         name: "viscous_damping",
         meaning: "a loss that grows with velocity, unlike in shortening and lengthening",
-        equation: "F <- F - B v |v/v0|^a,  B = B_contraction (v > 0) or B_extension (v < 0)",
+        equation: "F <- F - B v |v/v0|^a (1 + b (p/p0 - 1) + c (x/x0 - 1)),  B = B_contraction (v > 0) or B_extension (v < 0)",
         signature: "loop of the force residual grows with speed",
         experiment: "the same triangle at three speeds",
         reference: "Reynolds et al. 2003; thesis eq. 3.47",
         of_load: false,
         forms: &[&[("viscous_damping.contraction", &[200.0]), ("viscous_damping.extension", &[200.0])]],
-        refinements: &[("viscous_damping.exponent", &[0.2, -0.2])],
+        refinements: &[
+            ("viscous_damping.exponent", &[0.2, -0.2]),
+            ("viscous_damping.with_pressure", &[0.3]),
+            ("viscous_damping.with_contraction", &[0.3]),
+        ],
     };
 
     fn is_neutral(&self) -> bool {
@@ -59,7 +67,11 @@ impl Effect for ViscousDamping {
             0.0 => 1.0,
             exponent => (v.hypot(SMALL_VELOCITY) / REFERENCE_VELOCITY).powf(exponent),
         };
-        force - v * growth * if v > 0.0 { self.contraction } else { self.extension }
+        let place = 1.0
+            + self.with_pressure * (at.relative_pressure() - 1.0)
+            + self.with_contraction * (at.relative_contraction() - 1.0);
+        // Damping that would drive the muscle is none.
+        force - v * growth * place.max(0.0) * if v > 0.0 { self.contraction } else { self.extension }
     }
 
     fn sentence(&self) -> String {

@@ -688,3 +688,24 @@ FAR = {
     "force_sensor_gain": [BentForce],
     "temperature_drift": [HyperbolicWarmUp, SofterWhenWarm],
 }
+
+# Forms that the families of the tool hold by now, or almost: named as far, they would flatter it.
+SINCE_HELD = [
+    BentForce,
+    BentForceGain,
+    BentPosition,
+    BentPressure,
+    BentScale,
+    DampingOfContraction,
+    DampingOfPressure,
+    FallingCeiling,
+    KneedGain,
+    PorousLeak,
+    RingingPilot,
+    SettlingForce,
+    SettlingPosition,
+    SettlingPressure,
+    SettlingZero,
+    Throttle,
+    TwoMorePoles,
+]

@@ -21,14 +21,19 @@ from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from effects import KNOWN
-from far import FAR
+from far import FAR, SINCE_HELD
 from pairs import NEEDS_COLUMN_IN_PAIR, PAIRS
 from plant import STEP, VALVE_GAIN, Experiment, Specimen, holding_pressure, simulate
 from textbook import SAME_FORM, true_parameters
 from unknown import UNKNOWN
 
 FORMS = {**KNOWN, **UNKNOWN}
-NEAR_OR_FAR = {**dict.fromkeys(sum(KNOWN.values(), []), "near"), **dict.fromkeys(sum(FAR.values(), []), "far")}
+NEAR_OR_FAR = {
+    **dict.fromkeys(sum(KNOWN.values(), []), "near"),
+    **dict.fromkeys(sum(FAR.values(), []), "far"),
+    # Were far until the families of the tool were widened with a sight of them.
+    **dict.fromkeys(SINCE_HELD, "near"),
+}
 DRIVEN_SHARE = 0.25
 TOLERANCE = 0.03  # of the preset's coefficients, that of the tool by default
 MOST_DRAWS = 20
