@@ -3,7 +3,7 @@
 //! In the order data flows: [`variables`] declares what there is; [`muscle`], [`valve`], [`load`] and [`effects`] are the
 //! physics, [`memory`] what they remember, [`correction`] what is added where the cause is unknown; [`plant`], [`controller`] and [`mod@reference`] put it together; [`model`] steps it and [`mod@model_description`] describes
 //! it; [`models`] lists them. With the feature `tool`, [`package`] makes FMUs and [`mod@export`] writes them, [`measurement`] reads recordings, [`quality`] says what they can bear, [`simulation`] replays them and
-//! [`diagnosis`] says what the model gets wrong.
+//! [`diagnosis`] says what the model gets wrong; [`reproduction`] sets the thesis beside what comes out here.
 
 pub mod error;
 pub mod variables;
@@ -47,6 +47,8 @@ pub mod package;
 pub mod plot;
 #[cfg(feature = "tool")]
 pub mod quality;
+#[cfg(feature = "tool")]
+pub mod reproduction;
 #[cfg(feature = "tool")]
 pub mod simulation;
 #[cfg(feature = "tool")]

@@ -14,7 +14,7 @@ use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
 use sinew::simulation::{OUTPUTS, replay, rms_difference};
-use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, ssp, tuning};
+use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, reproduction, ssp, tuning};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -157,6 +157,13 @@ enum Command {
         plants: u32,
         /// Folder for closed-loop.md and its figures
         #[arg(long, default_value = "sinew-closed-loop")]
+        out: PathBuf,
+    },
+    /// Regenerate docs/thesis.md: what the thesis prints beside what comes out, with a verdict on each
+    #[command(after_help = "Example:\n  sinew reproduce --out docs")]
+    Reproduce {
+        /// Folder for thesis.md and its figures
+        #[arg(long, default_value = "sinew-reproduced")]
         out: PathBuf,
     },
     /// Do it all once, on recordings that ship with the program
@@ -362,6 +369,7 @@ fn run(command: Command) -> Result<Answer> {
         Command::Plan(arguments) => run_plan(&arguments),
         Command::Tune { parameters, load_mass, out } => tune(&parameters, load_mass, &out),
         Command::ClosedLoop { plants, out } => evaluate_closed_loop(plants, &out),
+        Command::Reproduce { out } => run_reproduction(&out),
         Command::Demo { out } => run_demo(&out),
         Command::List { what } => Ok(list(what)),
     }
@@ -567,6 +575,19 @@ fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
     bar.finish_and_clear();
     let files = export::write_whole(closed_loop::files(&evaluation, out))?;
     let mut json = closed_loop::to_json(&evaluation);
+    json["files"] = json!(files);
+    Ok(Answer { text: listed(&files), json })
+}
+
+fn run_reproduction(out: &Path) -> Result<Answer> {
+    let bar = progress(reproduction::pieces());
+    let found = reproduction::reproduce(&|name| {
+        bar.set_message(name.to_owned());
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let files = export::write_whole(reproduction::files(&found, out))?;
+    let mut json = reproduction::to_json(&found);
     json["files"] = json!(files);
     Ok(Answer { text: listed(&files), json })
 }

@@ -16,8 +16,8 @@ pub struct Curve<'a> {
 }
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito) and in print.
-const PALETTE: [RGBColor; 4] =
-    [RGBColor(40, 40, 40), RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115)];
+const PALETTE: [RGBColor; 5] =
+    [RGBColor(40, 40, 40), RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
 /// More points than this per curve are not seen.
 const MOST_POINTS: usize = 1200;
 
@@ -38,6 +38,8 @@ pub struct Panel<'a> {
     pub logarithmic: bool,
     /// Whether room is left for a legend; without a label a curve is not in it.
     pub legend: bool,
+    /// More room above the curves than usual, as a share of their range.
+    pub above: f64,
 }
 
 /// Width and height of one chart, pixels.
@@ -73,7 +75,7 @@ fn draw(svg: &mut String, panels: &[Panel]) -> Drawn {
         let all = || panel.curves.iter().chain(&panel.dots);
         // Room for the legend, so that it hides nothing.
         let labels = all().filter(|curve| !curve.label.is_empty()).count();
-        let above = if panel.legend { 0.1 + 0.09 * labels as f64 } else { 0.05 };
+        let above = panel.above + if panel.legend { 0.1 + 0.09 * labels as f64 } else { 0.05 };
         let x = padded(all().flat_map(|c| c.x.iter().copied()), 0.02);
         let y = padded(all().flat_map(|c| c.y.iter().copied()), above);
         let mut chart = ChartBuilder::on(area);
