@@ -34,6 +34,8 @@ pub mod diagnosis;
 #[cfg(feature = "tool")]
 pub mod export;
 #[cfg(feature = "tool")]
+pub mod hammerstein;
+#[cfg(feature = "tool")]
 pub mod identification;
 #[cfg(feature = "tool")]
 pub mod least_squares;

@@ -14,7 +14,7 @@ use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
 use sinew::simulation::{OUTPUTS, replay, rms_difference};
-use sinew::{Result, closed_loop, demo, export, package, ssp, tuning};
+use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, ssp, tuning};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -74,6 +74,19 @@ enum Command {
         fixed_braid: bool,
         /// Folder for parameters.toml, identification.json and the plots
         #[arg(long, default_value = "sinew-identified")]
+        out: PathBuf,
+    },
+    /// Fit a Hammerstein model, from command to contraction without physics, and set the physical one beside it
+    #[command(after_help = "Example:\n  sinew hammerstein run1.csv --parameters dmsp-40-1000 --out hammerstein\n\n\
+        The model is fitted to the first half of the recording and chosen by the next fifth; errors are those of the rest. It holds \
+        for the load of the recording. --parameters is the physical model.")]
+    Hammerstein {
+        #[command(flatten)]
+        recordings: RecordingSource,
+        #[command(flatten)]
+        parameters: ParameterSource,
+        /// Folder for hammerstein.json and the plot
+        #[arg(long, default_value = "sinew-hammerstein")]
         out: PathBuf,
     },
     /// Fit every force model to recordings and compare them
@@ -336,6 +349,9 @@ fn run(command: Command) -> Result<Answer> {
         Command::Identify { recordings, parameters, model, fixed_braid, out } => {
             run_identification(&parameters.load()?, &recordings.read()?, model, fixed_braid, &out)
         }
+        Command::Hammerstein { recordings, parameters, out } => {
+            run_hammerstein(&parameters.load()?, &recordings.read()?, &out)
+        }
         Command::Compare { files, renamed, parameters, muscles, models, out } => {
             let all = if muscles.is_empty() { vec![(parameters.source, files)] } else { muscles };
             run_comparison(all, &renamed, models, &out)
@@ -409,6 +425,18 @@ fn run_identification(
     found.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let said = identification::report::sentences(&found).join("\n");
     Ok(Answer { text: format!("{said}\n\n{}\n{}", table(rows).text, listed(&files)), json })
+}
+
+fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
+    let [recording] = recordings else {
+        let problem = "a Hammerstein model is one of a single recording: give one".to_owned();
+        return Err(Error::Recording { path: recordings[1].path.clone(), problem });
+    };
+    let found = hammerstein::identify(recording, parameters)?;
+    let files = export::write_whole(found.files(out))?;
+    let mut json = found.to_json();
+    json["files"] = json!(files);
+    Ok(Answer { text: format!("{}\n{}", found.sentence(), listed(&files)), json })
 }
 
 fn run_comparison(

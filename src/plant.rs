@@ -191,6 +191,7 @@ pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) 
     let mut still = *parameters;
     still.effects.valve_resonance = Default::default();
     still.effects.valve_lag.second_time_constant = 0.0;
+    still.effects.valve_lag.third_time_constant = 0.0;
     let own = still.effects.start(&at_rest(0.0, contraction));
     let rate = |pressure: f64| {
         let at = with_target(&still, command, at_rest(pressure, contraction), &own);

@@ -29,11 +29,25 @@ fn the_best_model_is_within_five_percent_on_every_muscle() {
     // Every model of one muscle on each other one, in two ways.
     assert_eq!(found.cross.len(), 3 * 2 * all_models().len() * 2);
     let page = report::html(&found);
-    assert!(!page.contains("http://") && !page.contains("https://"), "the report loads something");
+    // Names of XML namespaces load nothing; these would.
+    for load in ["<link", "<script src", "src=\"http", "href=\"http", "@import", "url(http", "url(//", "fetch("] {
+        assert!(!page.contains(load), "the report loads something by `{load}`");
+    }
     for model in all_models() {
         assert!(page.contains(model_name(model)), "{}", model_name(model));
     }
 }
+
+const SOURCES: &str = "\
+## Where the points are from
+
+`dmsp_20_300` and `dmsp_10_250` were measured by Martens and Boblan, `festo_dmsp_40` is FESTO's own characteristic, the
+figures of its sizing tool as others published them; sources, licences and caveats are in [data/README.md](../data/README.md). The two reconstructed muscles are made from the
+virtual-area models that the thesis prints, as its measurements were never published. The bounds of this page (10 % of full scale
+is failing, half the error is repaired, twice the relative error is bad, 80 % on one side is a sign) are ours.
+
+Made by `SINEW_UPDATE=1 cargo test --test compare`.
+";
 
 #[test]
 fn the_document_is_that_of_today() {
@@ -44,7 +58,7 @@ fn the_document_is_that_of_today() {
         let given = Parameters::preset(&name).unwrap();
         muscles.push(Muscle { name, given, recordings: read_all(&[file.into()], &[]).unwrap() });
     }
-    let text = report::markdown(&compare(muscles, &all_models()).unwrap());
+    let text = format!("{}\n{SOURCES}", report::markdown(&compare(muscles, &all_models()).unwrap()));
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/comparison.md");
     if std::env::var_os("SINEW_UPDATE").is_some() {
         std::fs::write(&path, &text).unwrap();
@@ -102,23 +116,44 @@ fn a_muscle_of_another_size_takes_normalised_parameters_exactly() {
 
 #[test]
 fn slow_trajectories_pass_where_the_muscle_rests_and_fast_ones_lag() {
-    use sinew::comparison::dynamic::{TRAJECTORIES, simulated, trajectory};
+    use sinew::comparison::dynamic::{Passage, TRAJECTORIES, simulated, trajectory};
     use sinew::identification::points::Branch;
-    let parameters = Parameters::default();
     let pressures = [1e5, 2e5, 3e5, 4e5];
-    let mut worst = Vec::new();
-    for values in TRAJECTORIES {
+    let played = |damping: f64, values| -> Vec<Passage> {
+        let mut parameters = Parameters::default();
+        parameters.muscle.damping = damping;
         let played = trajectory(&parameters, values, [0.5e5, 4.5e5], 30.0);
         let passages = simulated(&parameters, &played, &pressures).unwrap();
         assert_eq!(passages.len(), 2 * pressures.len(), "{passages:?}");
-        for passage in &passages {
-            let ahead = passage.dynamic - passage.at_rest;
-            // What moves lags behind: shorter on the way back, longer on the way there.
-            let lag = if passage.branch == Branch::Shortening { -ahead } else { ahead };
-            assert!(lag > -3e-3, "{values:?}: {passage:?}");
-        }
-        worst.push(passages.iter().map(|p| (p.dynamic - p.at_rest).abs()).fold(0.0, f64::max));
+        passages
+    };
+    // What moves lags behind: shorter on the way back, longer on the way there.
+    let lag = |p: &Passage| if p.branch == Branch::Shortening { p.at_rest - p.dynamic } else { p.dynamic - p.at_rest };
+    let worst = |passages: &[Passage]| passages.iter().map(|p| lag(p).abs()).fold(0.0, f64::max);
+    // So damped that 30 kg cannot swing, it lags in every passage.
+    let damped: Vec<Vec<Passage>> = TRAJECTORIES.iter().map(|values| played(2000.0, *values)).collect();
+    for passage in damped.iter().flatten() {
+        assert!(lag(passage) > -1e-6, "{passage:?}");
     }
-    println!("largest difference from rest, m: {worst:?}");
-    assert!(worst[0] < 1e-3 && worst[5] > 5.0 * worst[0], "{worst:?}");
+    let damped: Vec<f64> = damped.iter().map(|passages| worst(passages)).collect();
+    assert!(damped.is_sorted(), "{damped:?}");
+    // With the damping of the preset the load swings on a fast trajectory: where it is braked, it is ahead, as in thesis
+    // figure 4.56. By how much follows from its inertia: M a/k, twice that at the most, and the pressure brakes at 6 bar/s².
+    let free: Vec<Vec<Passage>> =
+        TRAJECTORIES.iter().map(|values| played(Parameters::default().muscle.damping, *values)).collect();
+    let ahead = free[5].iter().map(|p| -lag(p)).fold(0.0, f64::max);
+    let free: Vec<f64> = free.iter().map(|passages| worst(passages)).collect();
+    println!("largest difference from rest, m: {free:?}, damped {damped:?}; ahead by {ahead}");
+    assert!(free[0] < 1e-3 && free[5] > 5.0 * free[0], "{free:?}");
+    let Parameters { muscle, force_models, .. } = Parameters::default();
+    let force = |p: f64, x: f64| force_models.force(&muscle, p, x);
+    let inertia = (0..=350).map(|k| 1e5 + 1e3 * f64::from(k)).map(|pressure| {
+        let x = sinew::plant::equilibrium(&Parameters::default(), pressure, 30.0 * sinew::GRAVITY).unwrap();
+        let stiffness = (force(pressure, x - 1e-4) - force(pressure, x + 1e-4)) / 2e-4;
+        let per_pressure = (force(pressure + 10.0, x) - force(pressure, x)) / 10.0;
+        30.0 * 6e5 * (per_pressure / stiffness) / stiffness
+    });
+    let most = 2.0 * inertia.fold(0.0, f64::max);
+    println!("inertia explains up to {most} m");
+    assert!(ahead < most, "{ahead} against {most}");
 }

@@ -60,9 +60,9 @@ const MOST_LEVELS: usize = 32;
 /// A continuum is cut into so many classes of equal width.
 const CUTS: usize = 8;
 
-/// Levels of a quantity where it has few, and classes of equal width where it has many; ascending.
+/// Levels of a quantity where it has few, at least two points each on average, or else classes of equal width; ascending.
 pub fn classes(points: &[Point], of: fn(&Point) -> f64) -> Vec<Class> {
-    levels(points, of).unwrap_or_else(|| cut(points, of))
+    levels(points, of).filter(|levels| 2 * levels.len() <= points.len()).unwrap_or_else(|| cut(points, of))
 }
 
 /// Levels of a quantity; `None` where there are too many.

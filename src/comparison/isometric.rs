@@ -52,7 +52,10 @@ impl Relation {
         let loads = levels(&points, force).filter(|levels| FEWEST * levels.len() <= points.len());
         let (constant, classes, of): (_, Vec<Class>, fn(&Point) -> f64) = match loads {
             Some(loads) => (Constant::Load, loads, pressure),
-            None => (Constant::Pressure, classes(&points, pressure), force),
+            None => {
+                let pressures = levels(&points, pressure).unwrap_or_else(|| classes(&points, pressure));
+                (Constant::Pressure, pressures, force)
+            }
         };
         let contractions: Vec<f64> = points.iter().map(|point| point.contraction).collect();
         let near = SAME * range(&contractions);

@@ -84,7 +84,8 @@
       const { lengths } = muscle;
       const layers = lengths.flatMap((_, k) => {
         const of = (pairs, kind) => ({ x: pairs.map(([x]) => x), y: pairs.map(([, y]) => y), color: shade(k, lengths.length), ...kind });
-        return [of(model.isometric[k], { line: true }), of(muscle.isometric[k], { dots: true })];
+        return [of(model.isometric[k], { line: true }), of(muscle.isometric[k][0], { dots: true }), of(muscle.isometric[k][1], { hollow: true })]
+          .filter(({ x }) => x.length);
       });
       const names = lengths.map((length, k) => [`${digits(length, 3)} mm`, shade(k, lengths.length)]);
       return lengths.length ? { labels: ["gauge pressure [bar]", "force [N]"], layers, names } : null;

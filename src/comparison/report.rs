@@ -76,14 +76,43 @@ fn of_model(model: &Assessed, effective: f64) -> Value {
 
 /// The claim about cross-validation, for every pair of muscles.
 fn cross_claims(found: &Comparison) -> Vec<Claim> {
-    let names: Vec<&str> = found.muscles.iter().map(|muscle| muscle.name.as_str()).collect();
-    let pairs = names.iter().enumerate().flat_map(|(k, one)| names[k + 1..].iter().map(move |other| (*one, *other)));
-    pairs
+    pairs(found)
+        .into_iter()
         .flat_map(|(one, other)| {
             [Transfer::AsTheyAre, Transfer::Normalised].map(|how| claims::keeps_a_sign(&found.cross, one, other, how))
         })
         .flatten()
         .collect()
+}
+
+/// The thesis' claims, one row each, with a verdict per muscle.
+fn summary(found: &Comparison) -> (Vec<String>, Vec<Vec<String>>) {
+    let all: Vec<Vec<Claim>> = found.muscles.iter().map(claims::on_muscle).collect();
+    let names = found.muscles.iter().map(|muscle| muscle.name.clone());
+    let header = std::iter::once("claim of the thesis".to_owned()).chain(names).collect();
+    let row = |claim: &Claim| {
+        let of = |claims: &Vec<Claim>| {
+            claims.iter().find(|other| other.claim == claim.claim).map_or("–", |other| word(other.verdict)).to_owned()
+        };
+        std::iter::once(claim.claim.to_owned()).chain(all.iter().map(of)).collect()
+    };
+    (header, all.first().into_iter().flatten().map(row).collect())
+}
+
+const SIGN_HEADER: [&str; 3] = ["muscles", "coefficients as they are", "normalised"];
+
+/// Pairs of muscles, and whether the error of `improved-mckibben` keeps a sign between them.
+fn sign_rows(found: &Comparison) -> Vec<Vec<String>> {
+    let row = |(one, other): (&str, &str)| {
+        let verdict = |how| Some(word(claims::keeps_a_sign(&found.cross, one, other, how)?.verdict).to_owned());
+        Some(vec![format!("{one}, {other}"), verdict(Transfer::AsTheyAre)?, verdict(Transfer::Normalised)?])
+    };
+    pairs(found).into_iter().filter_map(row).collect()
+}
+
+fn pairs(found: &Comparison) -> Vec<(&str, &str)> {
+    let names: Vec<&str> = found.muscles.iter().map(|muscle| muscle.name.as_str()).collect();
+    names.iter().enumerate().flat_map(|(k, one)| names[k + 1..].iter().map(|other| (*one, *other))).collect()
 }
 
 /// A word for a verdict.
@@ -172,6 +201,11 @@ for the best. A number of fitted parameters near that of the levels of contracti
 /// The comparison as Markdown.
 pub fn markdown(found: &Comparison) -> String {
     let mut text = INTRODUCTION.to_owned();
+    let (header, rows_of_claims) = summary(found);
+    if found.muscles.len() > 1 && !rows_of_claims.is_empty() {
+        let _ = writeln!(text, "## What the thesis claims, muscle by muscle\n");
+        write_table(&mut text, &header.iter().map(String::as_str).collect::<Vec<_>>(), &rows_of_claims);
+    }
     for muscle in &found.muscles {
         let _ = writeln!(text, "## {}\n\n{}\n", muscle.name, headline(muscle));
         let _ = writeln!(text, "{}.\n", muscle.points.notes.join("; "));
@@ -183,13 +217,22 @@ pub fn markdown(found: &Comparison) -> String {
     }
     if !found.cross.is_empty() {
         let _ = writeln!(text, "## Parameters of one muscle on the points of another\n");
-        write_table(&mut text, &CROSS_HEADER, &cross_rows(found));
-        for claim in cross_claims(found) {
-            let _ = writeln!(text, "- {} **{}.** {}", claim.claim, capital(word(claim.verdict)), claim.because);
+        let signs = sign_rows(found);
+        if signs.is_empty() {
+            write_table(&mut text, &CROSS_HEADER, &cross_rows(found));
+        } else {
+            let _ = writeln!(text, "{SIGN}\n");
+            write_table(&mut text, &SIGN_HEADER, &signs);
+            let own: Vec<Vec<String>> =
+                cross_rows(found).into_iter().filter(|row| row[0] == "improved-mckibben").collect();
+            write_table(&mut text, &CROSS_HEADER, &own);
         }
     }
     text
 }
+
+const SIGN: &str = "The thesis finds that the error of `improved-mckibben` keeps a sign, opposite in the two directions. At least 80 % of \
+the points on one side, and on opposite sides, count as such. The other models are in `comparison.json`.";
 
 fn capital(word: &str) -> String {
     let mut letters = word.chars();
@@ -243,6 +286,9 @@ pub fn html(found: &Comparison) -> String {
     let page = context! {
         muscles => found.muscles.iter().map(muscle).collect::<Vec<_>>(),
         header => HEADER,
+        summary => summary(found),
+        sign_header => SIGN_HEADER,
+        signs => sign_rows(found),
         cross_header => CROSS_HEADER,
         cross => cross_rows(found),
         claims => shown(cross_claims(found)),
@@ -315,8 +361,18 @@ fn figures(muscle: &OnMuscle) -> Value {
     let (pressure_of, pressure_values) = label_of(classes(&points, pressure));
     let relation = Relation::of(&points, None);
     let branches = [Branch::Shortening, Branch::Lengthening];
-    let lengths = relation.contractions(ISOMETRIC);
     let in_bar = |pairs: Vec<(f64, f64)>| pairs.into_iter().map(|(p, f)| (p / 1e5, f)).collect::<Vec<_>>();
+    // Each branch of a hysteresis where both were measured, or else all points together.
+    let by_branch = branches.map(|branch| Relation::of(&points, Some(branch)));
+    let both = by_branch.iter().all(|relation| relation.curves.len() > 1);
+    let isometric = |x: f64| {
+        if both {
+            by_branch.iter().map(|relation| in_bar(relation.isometric(x))).collect::<Vec<_>>()
+        } else {
+            vec![in_bar(relation.isometric(x)), Vec::new()]
+        }
+    };
+    let lengths = relation.contractions(ISOMETRIC);
     let [low, high] = ends(&points, pressure);
     let model = |model: &Assessed| {
         let parameters = &model.fitted.parameters;
@@ -346,7 +402,7 @@ fn figures(muscle: &OnMuscle) -> Value {
         "load_of": load_of, "loads": load_values,
         "pressure_of": pressure_of, "pressures": pressure_values.iter().map(|p| p / 1e5).collect::<Vec<_>>(),
         "lengths": lengths.iter().map(|x| x * 1e3).collect::<Vec<_>>(),
-        "isometric": lengths.iter().map(|x| in_bar(relation.isometric(*x))).collect::<Vec<_>>(),
+        "isometric": lengths.iter().map(|x| isometric(*x)).collect::<Vec<_>>(),
         "models": muscle.models.iter().map(model).collect::<Vec<_>>(),
     })
 }

@@ -5,13 +5,15 @@
 //! by [`crate::least_squares`], from several starts. Points far off count less: weights min(1, 2 s/|r|) after Huber, s the
 //! median of |r| over 0.6745, anew until the forces rest.
 //!
-//! The covariance is the sandwich (JᵀWJ)⁻¹ Jᵀ W² R² J (JᵀWJ)⁻¹, which asks for neither equal noise nor a true model. Residuals
-//! that follow their neighbours count as fewer: n (1 − ρ)/(1 + ρ) for a correlation ρ > 0 with the next point. Intervals
-//! are of Student's t.
+//! The covariance is the sandwich B⁻¹ Jᵀ Ψ² J B⁻¹, which asks for neither equal noise nor a true model: Ψ holds the weighted
+//! residuals w r, and B = JᵀJ of the points that count in full, as a point farther off pulls no more when it moves away.
+//! A point that counts in full has drawn the fit towards itself: its residual is r/(1 − h), h its leverage (HC3). Residuals that
+//! follow their neighbours count as fewer: n (1 − ρ)/(1 + ρ) for a correlation ρ > 0 with the next point. Intervals are of
+//! Student's t.
 //!
 //! # Reference
 //! G. Golub and V. Pereyra (1973), doi 10.1137/0710036; P. Huber (1964), doi 10.1214/aoms/1177703732; H. White (1980),
-//! doi 10.2307/1912934; effective size as of a first-order autoregression, doi 10.1175/1520-0442 (Zwiers and von Storch 1995).
+//! doi 10.2307/1912934; J. MacKinnon and H. White (1985), doi 10.1016/0304-4076(85)90158-7; effective size as of a first-order autoregression, doi 10.1175/1520-0442 (Zwiers and von Storch 1995).
 
 use super::points::{Point, median, thinned};
 use super::structure::{Parameter, Structure, forces};
@@ -227,14 +229,18 @@ impl Problem<'_> {
         let columns: Vec<Vec<f64>> = moving.iter().map(|&k| structure.derivative(&values, k, self.points)).collect();
         let lengths: Vec<f64> = columns.iter().map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt()).collect();
         let jacobian = DMatrix::from_fn(self.points.len(), moving.len(), |row, k| {
-            weights[row].sqrt() * columns[k][row] / lengths[k].max(f64::MIN_POSITIVE)
+            columns[k][row] / lengths[k].max(f64::MIN_POSITIVE)
         });
         let effective = effective_size(&residuals, self.points);
         let mut half_widths = vec![None; count];
         let (mut singular_values, mut weak) = (Vec::new(), Vec::new());
         if !moving.is_empty() && jacobian.iter().all(|v| v.is_finite()) {
-            let svd = jacobian.clone().svd(true, true);
-            let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
+            let counts = |row: usize| weights[row] >= 1.0;
+            let counting = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |row, k| {
+                if counts(row) { jacobian[(row, k)] } else { 0.0 }
+            });
+            let svd = counting.svd(false, true);
+            let v_t = svd.v_t.expect("asked for");
             let largest = svd.singular_values.max();
             singular_values = svd.singular_values.iter().map(|s| s / largest).collect();
             singular_values.sort_by(|a, b| b.total_cmp(a));
@@ -249,14 +255,17 @@ impl Problem<'_> {
                     shares.filter(|(_, share)| share.abs() > 0.2 * largest).collect()
                 })
                 .collect();
-            // J⁺ = V S⁻¹ Uᵀ; the covariance is J⁺ W R² J⁺ᵀ.
+            // With J = U S Vᵀ the covariance is V S⁻¹ Uᵀ Ψ² U S⁻¹ Vᵀ, and the leverages are the squares of the rows of U.
             let degrees = (effective - count as f64).max(1.0);
-            let inflation = self.points.len() as f64 / degrees;
+            let inflation = self.points.len() as f64 / effective;
             let quantile = StudentsT::new(0.0, 1.0, degrees).map_or(1.96, |t| t.inverse_cdf(0.975));
-            let inner = DMatrix::from_fn(self.points.len(), moving.len(), |row, k| {
-                u[(row, k)] * weights[row].sqrt() * residuals[row] / svd.singular_values[k].max(1e-300)
-            });
-            let spread = v_t.tr_mul(&inner.tr_mul(&inner)) * &v_t;
+            let back = v_t.transpose() * DMatrix::from_diagonal(&svd.singular_values.map(|s| 1.0 / s.max(1e-300)));
+            let mut inner = &jacobian * &back;
+            for (row, mut of_point) in inner.row_iter_mut().enumerate() {
+                let leverage = if counts(row) { of_point.norm_squared() } else { 0.0 };
+                of_point *= weights[row] * residuals[row] / (1.0 - leverage).max(1e-6);
+            }
+            let spread = &back * inner.tr_mul(&inner) * back.transpose();
             for (i, &k) in moving.iter().enumerate() {
                 half_widths[k] = Some(quantile * (spread[(i, i)] * inflation).sqrt() / lengths[i]);
             }

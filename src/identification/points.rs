@@ -108,7 +108,7 @@ impl Points {
                 let copies = before - points.len();
                 found.notes.push(format!("{}: {copies} points repeat others and count once", recordings[k].name()));
             }
-            mark_branches(&mut points);
+            mark_branches(&mut points, source == Source::Rows);
             found.notes.push(format!("{}: {}, {} of them", recordings[k].name(), source.words(), points.len()));
             found.all.extend(points);
             found.sources.push(source);
@@ -325,7 +325,9 @@ fn distinct(points: &[Point]) -> usize {
     points.iter().map(cell).collect::<std::collections::HashSet<_>>().len()
 }
 
-fn mark_branches(points: &mut [Point]) {
+/// Which way each point was reached. Where rows stand for themselves, a leap over half the range starts another curve, and
+/// its first point is of the branch that follows, as the first of all is.
+fn mark_branches(points: &mut [Point], rows: bool) {
     let values: Vec<f64> = points.iter().map(|point| point.contraction).collect();
     let near = 1e-3 * range(&values);
     let mut branch = Branch::Unknown;
@@ -336,9 +338,11 @@ fn mark_branches(points: &mut [Point]) {
         }
         points[k].branch = branch;
     }
-    // The first point is where the motion starts.
-    if let [first, second, ..] = points {
-        first.branch = second.branch;
+    let leaps = |k: usize| rows && (values[k] - values[k - 1]).abs() > 0.5 * range(&values);
+    for k in 0..points.len().saturating_sub(1) {
+        if k == 0 || leaps(k) {
+            points[k].branch = points[k + 1].branch;
+        }
     }
 }
 

@@ -61,6 +61,11 @@ pub fn sentences(found: &Identification) -> Vec<String> {
             .iter()
             .map(|held| format!("`{}` is held at {:?}: {}.", held.name, held.value, held.reason)),
     );
+    if !found.points.in_motion() {
+        let damping = found.parameters.muscle.damping;
+        let swings = if damping == 0.0 { "; without any, a load swings for ever" } else { "" };
+        said.push(format!("`muscle.damping` stays at {damping:?} N s/m, points at rest do not tell it{swings}."));
+    }
     for k in at_bounds(found) {
         let parameter = &fitted.structure.free[k];
         said.push(format!("`{}` stopped at its bound {:?}: no interval.", parameter.variable.name, fitted.values[k]));
