@@ -532,7 +532,8 @@ impl Basis {
                 let mut parameters = Parameters::preset(&format!("{muscle}/thesis"))?;
                 parameters.valve.bandwidth = bandwidth.unwrap_or(parameters.valve.bandwidth);
                 let cases = cases().into_iter().filter(|case| case.muscle == muscle).collect::<Vec<_>>();
-                let error = |case| Ok(outcome(&parameters, case, &Unknown::default())?.largest_error / case.stroke);
+                let stroke = parameters.reference.target - parameters.reference.start;
+                let error = |case| Ok(outcome(&parameters, case, &Unknown::default())?.largest_error / stroke);
                 cases.par_iter().map(error).collect::<Result<Vec<_>>>()?.into_iter().fold(0.0, f64::max)
             }
         })
