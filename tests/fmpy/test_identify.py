@@ -4,6 +4,7 @@ import json
 
 import pytest
 from fmpy import simulate_fmu
+
 from support import ROOT, run
 from test_report import Browser
 
