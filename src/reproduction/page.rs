@@ -137,9 +137,9 @@ fn reasons(items: &[Judged]) -> String {
     for judged in items {
         if let Some(reason) = &judged.item.reason {
             let (item, verdict) = (&judged.item, judged.verdict.words());
-            let _ = write!(
+            let _ = writeln!(
                 text,
-                "{}- **{}**, {}: {verdict}. {reason}\n",
+                "{}- **{}**, {}: {verdict}. {reason}",
                 if text.is_empty() { "\n" } else { "" },
                 item.at,
                 item.what
