@@ -330,7 +330,7 @@ impl<'a, 'b> Search<'a, 'b> {
             return refused(wrong);
         }
         let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
-        if !self.holds(&model)? {
+        if model.hypothesis.is_impossible(&model.parameters) || !self.holds(&model)? {
             return refused(wrong);
         }
         let rivals = self.rivals(&best, &levels[best.fitted.hypothesis.parts.len() - 1]);

@@ -13,11 +13,11 @@ IMPROBABLE = 1e-3
 
 CLAIMED = {
     "full size": {
-        NAMED: 0.75,
+        NAMED: 0.85,
         NOMINAL: 0.99,
-        NO_NAME: 0.94,
-        BOTH_NAMED: 0.45,
-        FIRST_OF_TWO: 0.75,
+        NO_NAME: 0.88,
+        BOTH_NAMED: 0.5,
+        FIRST_OF_TWO: 0.8,
     },
 }
 
