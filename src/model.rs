@@ -529,9 +529,10 @@ pub trait Model: Send {
 }
 
 impl<S: Registered> Simulator<S> {
-    /// Steps for a central difference around a value: a compromise of truncation and rounding.
+    /// Steps for a central difference around a value: a compromise of truncation and rounding, which is larger where an output
+    /// is a difference itself.
     fn difference_step(&self, position: usize) -> f64 {
-        let size = self.get(position).abs().max(S::interface().variables[position].declaration.unit.nominal * 1e-3);
+        let size = self.get(position).abs().max(S::interface().variables[position].declaration.unit.nominal * 0.1);
         size * f64::EPSILON.cbrt()
     }
 }
