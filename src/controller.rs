@@ -13,7 +13,7 @@ crate::variables::variables! {
     ///
     /// # Model
     /// u = u_ff + K_p e + K_i ∫e dt + D, e = setpoint − measured; D is K_d de/dt through a first-order filter with
-    /// time constant T_f. The command stays within its limits, and the integral stops while it is at one.
+    /// time constant T_f. The command stays within its limits, and the integral stops while it is 1 mV beyond one.
     ///
     /// # Validity
     /// The gains of the presets are those of `sinew tune`, rounded: on the linearised plant, 20–80 kg and contractions up to
@@ -180,12 +180,17 @@ fn commands(parameters: &Parameters, inputs: &ControllerInputs, state: &Controll
     (feed_forward, feed_forward + proportional_gain * error + integral + derivative_gain * derivative)
 }
 
+/// How far in V beyond its limits the command may come before the integral part rests. It must not stop at once: between
+/// growth below a limit and rest above it, no step would be short enough.
+const LIMIT_WIDTH: f64 = 1e-3;
+
 /// Rate in V/s of the integral part, while the command would be this without limits.
 fn integral_rate(controller: &Controller, error: f64, unlimited: f64) -> f64 {
     let rate = controller.integral_gain * error;
-    let winds_up = (unlimited > controller.maximum_command && rate > 0.0)
-        || (unlimited < controller.minimum_command && rate < 0.0);
-    if winds_up { 0.0 } else { rate }
+    let beyond =
+        if rate > 0.0 { unlimited - controller.maximum_command } else { controller.minimum_command - unlimited };
+    // Not `clamp`, which keeps NaN.
+    rate * (1.0 - beyond / LIMIT_WIDTH).max(0.0).min(1.0)
 }
 
 fn outputs_now(parameters: &Parameters, inputs: &ControllerInputs, state: &ControllerState) -> ControllerOutputs {
