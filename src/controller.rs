@@ -13,7 +13,7 @@ crate::variables::variables! {
     ///
     /// # Model
     /// u = u_ff + K_p e + K_i ∫e dt + D, e = setpoint − measured; D is K_d de/dt through a first-order filter with
-    /// time constant T_f. The command stays within its limits, and the integral stops while it is 1 mV beyond one.
+    /// time constant T_f. The command stays within its limits, and the integral rests while it is 1 mV beyond one.
     ///
     /// # Validity
     /// The gains of the presets are those of `sinew tune`, rounded: on the linearised plant, 20–80 kg and contractions up to
@@ -180,17 +180,14 @@ fn commands(parameters: &Parameters, inputs: &ControllerInputs, state: &Controll
     (feed_forward, feed_forward + proportional_gain * error + integral + derivative_gain * derivative)
 }
 
-/// How far in V beyond its limits the command may come before the integral part rests. It must not stop at once: between
-/// growth below a limit and rest above it, no step would be short enough.
+/// How far in V beyond its limits the command of the continuous controller may come before the integral part rests. It must
+/// not stop at once: between growth below a limit and rest above it, no step would be short enough.
 const LIMIT_WIDTH: f64 = 1e-3;
 
-/// Rate in V/s of the integral part, while the command would be this without limits.
-fn integral_rate(controller: &Controller, error: f64, unlimited: f64) -> f64 {
-    let rate = controller.integral_gain * error;
-    let beyond =
-        if rate > 0.0 { unlimited - controller.maximum_command } else { controller.minimum_command - unlimited };
-    // Not `clamp`, which keeps NaN.
-    rate * (1.0 - beyond / LIMIT_WIDTH).max(0.0).min(1.0)
+/// How far in V the command, without limits, is beyond the one towards which the integral part drives it; negative within.
+fn beyond_limit(controller: &Controller, error: f64, unlimited: f64) -> f64 {
+    let grows = controller.integral_gain * error > 0.0;
+    if grows { unlimited - controller.maximum_command } else { controller.minimum_command - unlimited }
 }
 
 fn outputs_now(parameters: &Parameters, inputs: &ControllerInputs, state: &ControllerState) -> ControllerOutputs {
@@ -233,7 +230,8 @@ impl Held {
         (self.command, self.feed_forward) = (outputs.command, outputs.feed_forward);
         let [integral, filtered_error, filtered_acceleration] = self.state;
         let error = outputs.control_error;
-        let rate = integral_rate(controller, error, commands(parameters, inputs, &self.state).1);
+        let is_beyond = beyond_limit(controller, error, commands(parameters, inputs, &self.state).1) > 0.0;
+        let rate = if is_beyond { 0.0 } else { controller.integral_gain * error };
         let smooth = |now: f64, filtered: f64| (filter * filtered + sample_time * now) / (filter + sample_time);
         self.state = [
             integral + sample_time * rate,
@@ -339,7 +337,8 @@ impl System for PidFeedForward {
             return;
         }
         let error = inputs.setpoint - inputs.measured_contraction;
-        rates[0] = integral_rate(controller, error, commands(parameters, inputs, state).1);
+        let beyond = beyond_limit(controller, error, commands(parameters, inputs, state).1);
+        rates[0] = controller.integral_gain * error * (1.0 - beyond.max(0.0) / LIMIT_WIDTH).max(0.0);
         rates[1] = filtered_derivative(parameters, error, state[1]);
         rates[2] = filtered_derivative(parameters, inputs.setpoint_acceleration, state[2]);
     }
