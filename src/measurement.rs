@@ -79,6 +79,8 @@ pub struct Recording {
 
 /// Fewest samples that are worth looking at.
 const FEWEST_SAMPLES: usize = 10;
+/// Samples that thinning leaves at least.
+const THINNED_SAMPLES: usize = 1000;
 
 impl Recording {
     /// Reads a CSV file. `renamed` holds pairs of a header as the file has it and the name it stands for here.
@@ -217,6 +219,41 @@ impl Recording {
     /// Hanging load in kg; `None` where the motion is prescribed.
     pub fn load_mass(&self) -> Option<f64> {
         self.get(LoadMass)?.iter().copied().find(|mass| !mass.is_nan())
+    }
+
+    /// Usual time between samples, s.
+    pub fn period(&self) -> f64 {
+        let mut steps: Vec<f64> = self.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let middle = steps.len() / 2;
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// The recording with samples no closer than `period` s, as far as at least [`THINNED_SAMPLES`] remain. Samples are left
+    /// out; the command is a weighted mean, its weight falling to zero at the next sample that stays, so that a step
+    /// between two of them keeps its time.
+    pub fn thinned(&self, period: f64) -> Self {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let every = ((1.01 * period / self.period()) as usize).min(self.time.len() / THINNED_SAMPLES).max(1);
+        let kept = || (0..self.time.len()).step_by(every);
+        let picked = |values: &[f64]| kept().map(|k| values[k]).collect();
+        let mean = |values: &[f64], centre: usize| {
+            let near = centre.saturating_sub(every - 1)..(centre + every).min(values.len());
+            let present = near.filter(|k| !values[*k].is_nan());
+            let weighted = present.map(|k| ((every - k.abs_diff(centre)) as f64, values[k]));
+            let (weights, sum) =
+                weighted.fold((0.0, 0.0), |(w, sum), (weight, value)| (w + weight, sum + weight * value));
+            sum / weights
+        };
+        let thinned = |(signal, values): (&Signal, &Vec<f64>)| {
+            let is_command = *signal == Command;
+            (*signal, if is_command { kept().map(|k| mean(values, k)).collect() } else { picked(values) })
+        };
+        Self {
+            time: picked(&self.time),
+            lines: kept().map(|k| self.line(k)).collect(),
+            signals: self.signals.iter().map(thinned).collect(),
+            ..self.clone()
+        }
     }
 
     /// File name for people, with its folder only where another recording has the same.
@@ -422,6 +459,25 @@ mod tests {
             let message = parse(&text).unwrap_err().to_string();
             assert!(message.starts_with(expected), "{message} should start with {expected}");
         }
+    }
+
+    #[test]
+    fn thinning_keeps_samples_and_averages_commands() {
+        let text: String = (0..6000).fold("time [ms],command [V],contraction [m]\n".to_owned(), |text, k| {
+            let missing = if k == 8 { String::new() } else { format!("{}", 0.1 + 1e-5 * f64::from(k)) };
+            text + &format!("{k},{},{missing}\n", if k % 2 == 0 { 1.0 } else { 2.0 })
+        });
+        let thinned = parse(&text).unwrap().thinned(4e-3);
+        assert_eq!(thinned.time.len(), 1500);
+        for k in 1..1500 {
+            assert!((thinned.time[k] - 4e-3 * k as f64).abs() < 1e-12);
+            assert!((thinned.get(Command).unwrap()[k] - 1.5).abs() < 1e-12);
+            let contraction = thinned.get(Contraction).unwrap()[k];
+            assert!(if k == 2 { contraction.is_nan() } else { (contraction - 0.1 - 4e-5 * k as f64).abs() < 1e-12 });
+        }
+        assert_eq!(thinned.line(1), 6);
+        assert_eq!(parse(&text).unwrap().thinned(1e-3).time.len(), 6000);
+        assert_eq!(parse(&text).unwrap().thinned(1.0).time.len(), 1000);
     }
 
     #[test]

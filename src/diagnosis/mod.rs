@@ -36,6 +36,10 @@ use std::collections::BTreeMap;
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
 
+/// Samples closer than this, s, are not used one by one in fits: two hundred a second resolve the fastest effect, and more
+/// of them only take longer.
+const FINEST_PERIOD: f64 = 5e-3;
+
 /// What the recordings say of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -146,23 +150,31 @@ pub fn diagnose(
         path: recordings[0].path.clone(),
         problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
     };
-    let mut bench = Bench::new(Data::new(recordings, nominal, tolerance)?, nominal, tolerance);
+    let data = Data::new(recordings, nominal, tolerance)?;
+    let thinned: Vec<Recording> = recordings.iter().map(|recording| recording.thinned(FINEST_PERIOD)).collect();
+    let mut bench = Bench::new(Data::new(&thinned, nominal, tolerance)?, nominal, tolerance);
     let first = bench.baseline().ok_or_else(cannot_follow)?;
     bench.refine_noise(&first.residuals);
     let baseline = bench.baseline().ok_or_else(cannot_follow)?;
     done("nominal");
     let chosen = Search::new(&mut bench, baseline).run(done).ok_or_else(cannot_follow)?;
-    answer(&bench, nominal, &chosen, notes).ok_or_else(cannot_follow)
+    answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
 }
 
-/// The choice in words and figures.
-fn answer(bench: &Bench, nominal: &Parameters, chosen: &Chosen, notes: Vec<String>) -> Option<Diagnosis> {
-    let data = &bench.data;
+/// The choice in words and figures, its errors on all samples.
+fn answer(
+    bench: &Bench,
+    mut data: Data,
+    nominal: &Parameters,
+    chosen: &Chosen,
+    notes: Vec<String>,
+) -> Option<Diagnosis> {
     let nominal_residuals = data.residuals(nominal)?;
+    let mut left = data.residuals(&chosen.model.parameters)?;
+    data.refine_noise(&left);
     let (parameters, corrections) = bench.intervals(&chosen.model, Scope::Training);
     let nominal_errors = data.held_out_rms(&nominal_residuals);
     let mut extended = chosen.model.parameters;
-    let mut left = chosen.model.residuals.clone();
     let mut extended_errors = data.held_out_rms(&left);
     let weighted = |errors: &BTreeMap<Signal, f64>| {
         let squares = errors.iter().map(|(signal, rms)| (rms / data.noise(*signal).level).powi(2));
@@ -197,7 +209,7 @@ fn answer(bench: &Bench, nominal: &Parameters, chosen: &Chosen, notes: Vec<Strin
         extended,
         corrections,
         notes,
-        remaining: remaining::remaining(data, &extended, &left),
+        remaining: remaining::remaining(&data, &extended, &left),
     })
 }
 

@@ -122,7 +122,7 @@ impl<'a> Data<'a> {
             let of_signal = self.segments.iter().filter(move |segment| segment.signal == signal);
             of_signal.map(|segment| {
                 let series = self.series(segment, residuals);
-                let noise = noise::estimate(&series, self.period(segment.recording));
+                let noise = noise::estimate(&series, self.recordings[segment.recording].period());
                 let finest = FINEST * span(self.measured(segment));
                 (segment.samples.len() as f64, noise.level.max(finest).powi(2), noise.inflation)
             })
@@ -214,7 +214,7 @@ impl<'a> Data<'a> {
                 samples: scaled.len(),
                 excess: mean_square(&scaled),
                 structure: self.structure(segment.signal),
-                effective: effective_samples(&scaled, self.period(segment.recording)),
+                effective: effective_samples(&scaled, self.recordings[segment.recording].period()),
             })
             .collect()
     }
@@ -300,14 +300,6 @@ impl<'a> Data<'a> {
         let mut series = vec![f64::NAN; self.recordings[segment.recording].time.len()];
         segment.samples.iter().zip(&residuals[segment.range.clone()]).for_each(|(&k, residual)| series[k] = *residual);
         series
-    }
-
-    /// Usual time between samples of a recording, s.
-    fn period(&self, recording: usize) -> f64 {
-        let time = &self.recordings[recording].time;
-        let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let middle = steps.len() / 2;
-        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 }
 
