@@ -115,6 +115,9 @@ pub struct Diagnosis {
     pub improvement: f64,
     /// Which samples no fit saw.
     pub held_out: String,
+    /// Whether the fit saw those as well, because the others do not tell the size of a cause precisely enough to foretell
+    /// them.
+    pub saw_all: bool,
     /// All candidates, the best first.
     pub ranking: Vec<Ranked>,
     /// The extended model: the nominal one with corrections within the tolerance and the named cause.
@@ -167,8 +170,13 @@ fn answer(
     mut data: Data,
     nominal: &Parameters,
     chosen: &Chosen,
-    notes: Vec<String>,
+    mut notes: Vec<String>,
 ) -> Option<Diagnosis> {
+    if chosen.saw_all {
+        notes.push(
+            "the fit saw all samples: the first ones do not tell the size of the cause precisely enough".to_owned(),
+        );
+    }
     let nominal_residuals = data.residuals(nominal)?;
     let mut left = data.residuals(&chosen.model.parameters)?;
     data.refine_noise(&left);
@@ -205,6 +213,7 @@ fn answer(
         signals: signals.collect(),
         improvement: if before > 0.0 { 1.0 - after / before } else { 0.0 },
         held_out: data.held_out(),
+        saw_all: chosen.saw_all,
         ranking: chosen.singles.iter().map(baseline).collect(),
         extended,
         corrections,

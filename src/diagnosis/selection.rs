@@ -58,6 +58,8 @@ pub struct Chosen {
     pub verdict: Verdict,
     /// The hypothesis whose effects are named, fitted to the samples that fits may see; that of the baseline where none is.
     pub model: Fitted,
+    /// Whether that fit saw all samples, since the first ones tell too little.
+    pub saw_all: bool,
     /// Per effect of the model, in its order: effects that could stand in its place.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The hypotheses with these effects in their place.
@@ -322,7 +324,14 @@ impl<'a, 'b> Search<'a, 'b> {
         let singles = levels[0].clone();
         let refused = |verdict| {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
-            Some(Chosen { verdict, model, alternatives: Vec::new(), rivals: Vec::new(), singles: singles.clone() })
+            Some(Chosen {
+                verdict,
+                model,
+                saw_all: false,
+                alternatives: Vec::new(),
+                rivals: Vec::new(),
+                singles: singles.clone(),
+            })
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
         let Some(best) = self.best(&levels) else { return refused(wrong) };
@@ -330,9 +339,14 @@ impl<'a, 'b> Search<'a, 'b> {
             return refused(wrong);
         }
         let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
-        if model.hypothesis.is_impossible(&model.parameters) || !self.holds(&model)? {
+        if model.hypothesis.is_impossible(&model.parameters) {
             return refused(wrong);
         }
+        let holds_out = self.holds(&model)?;
+        if !(holds_out || self.is_as_good_in_training(&best.fitted, &model) && self.holds(&best.fitted)?) {
+            return refused(wrong);
+        }
+        let model = if holds_out { model } else { best.fitted.clone() };
         let rivals = self.rivals(&best, &levels[best.fitted.hypothesis.parts.len() - 1]);
         let alternatives: Vec<Vec<&'static str>> =
             best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
@@ -344,7 +358,16 @@ impl<'a, 'b> Search<'a, 'b> {
             Verdict::PartlyExplained
         };
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
-        Some(Chosen { verdict, model, alternatives, rivals, singles })
+        Some(Chosen { verdict, model, saw_all: !holds_out, alternatives, rivals, singles })
+    }
+
+    /// Whether the first samples cannot tell a fit from their own best.
+    ///
+    /// A pilot that sticks jumps or does not: values that no jump among the first samples tells apart make the later ones
+    /// different altogether.
+    fn is_as_good_in_training(&self, fitted: &Fitted, trained: &Fitted) -> bool {
+        let seen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, Scope::Training);
+        !self.shows(&seen(fitted), &seen(trained))
     }
 
     /// Whether a hypothesis that was fitted to the samples that fits may see does better on those that they may not.

@@ -40,7 +40,15 @@ impl Effect for ContractionSensorOffset {
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
         of_load: false,
-        forms: &[&[("contraction_sensor_offset.offset", &[5e-3, -5e-3])]],
+        forms: &[
+            &[("contraction_sensor_offset.offset", &[5e-3, -5e-3])],
+            // Corrections of the muscle take a constant offset over, and leave how it settles.
+            &[
+                ("contraction_sensor_offset.offset", &[5e-3, -5e-3, 5e-3, -5e-3]),
+                ("contraction_sensor_offset.settling_share", &[0.5]),
+                ("contraction_sensor_offset.settling_time", &[4.0, 4.0, 15.0, 15.0]),
+            ],
+        ],
         refinements: &[
             ("contraction_sensor_offset.settling_share", &[0.3]),
             ("contraction_sensor_offset.settling_time", &[5.0]),

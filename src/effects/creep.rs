@@ -1,16 +1,17 @@
 use super::{Description, Effect, Point};
 
 crate::variables::variables! {
-    /// Creep: the membrane gives way slowly.
+    /// Creep: the membrane gives way slowly, or lets the pressure through to the braid slowly.
     ///
     /// # Model
     /// The membrane feels x − d₁ − d₂, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
     /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing
-    /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r).
+    /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The area feels p + d_p, with
+    /// τ₁ dd_p/dt + d_p = a_p (p − p(0)), `pressure_amplitude` a_p.
     ///
     /// # In the data
     /// Contraction drifts for seconds at constant measured pressure, unlike up and down; in a prescribed motion the force
-    /// does. A leak drifts in the pressure; hysteresis does not depend on time.
+    /// does, with the pressure part also where the muscle is locked. A leak drifts in the pressure; hysteresis does not depend on time.
     ///
     /// # Validity
     /// 2 to 20 % of a step over 0.5 to 100 s. By default the muscle counts as relaxed where it starts, so that a
@@ -32,6 +33,8 @@ crate::variables::variables! {
         relaxed_share: f64 = 1.0, ONE, (0.0..=1.0);
         /// Share of the remaining drift that lies before the start
         settled_share: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Drift of the pressure that the braid feels, per pressure
+        pressure_amplitude: f64 = 0.0, ONE, (-0.5..=1.0);
     }
 }
 
@@ -39,36 +42,52 @@ impl Effect for Creep {
     const DESCRIPTION: Description = Description {
         name: "creep",
         meaning: "slow visco-elastic drift of the membrane at constant pressure",
-        equation: "x <- x - d1 - d2;  tau_i d(d_i)/dt + d_i = a_i (x - x_r)",
+        equation: "x <- x - d1 - d2;  tau_i d(d_i)/dt + d_i = a_i (x - x_r);  A p <- A (p + d_p)",
         signature: "drift over seconds at constant measured pressure",
         experiment: "hold for a minute after a step, up and down",
         reference: "Kelvin-Voigt; Minh et al. 2010",
         of_load: false,
-        forms: &[&[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])]],
+        forms: &[
+            &[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])],
+            &[("creep.pressure_amplitude", &[0.15]), ("creep.time_1", &[1.5, 10.0])],
+        ],
         refinements: &[
             ("creep.amplitude_2", &[0.05]),
             ("creep.time_2", &[15.0, 0.5]),
             ("creep.relaxed_share", &[0.5]),
             ("creep.settled_share", &[0.5]),
+            ("creep.pressure_amplitude", &[0.05]),
         ],
     };
-    /// Both drifts, and the contraction where nothing drifts.
-    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1];
+    /// Both drifts, the contraction and the pressure where nothing drifts, and the drift of the pressure.
+    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e5, 1e5];
 
     fn is_neutral(&self) -> bool {
-        self.amplitude_1 == 0.0 && self.amplitude_2 == 0.0
+        self.amplitude_1 == 0.0 && self.amplitude_2 == 0.0 && self.pressure_amplitude == 0.0
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {
         let relaxed = self.relaxed_share * at.contraction;
         let settled = self.settled_share * (at.contraction - relaxed);
-        own.copy_from_slice(&[self.amplitude_1 * settled, self.amplitude_2 * settled, relaxed]);
+        own.copy_from_slice(&[
+            self.amplitude_1 * settled,
+            self.amplitude_2 * settled,
+            relaxed,
+            at.gauge_pressure,
+            0.0,
+        ]);
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let strain = at.contraction - own[2];
         rates[0] = (self.amplitude_1 * strain - own[0]) / self.time_1;
         rates[1] = (self.amplitude_2 * strain - own[1]) / self.time_2;
+        rates[4] = (self.pressure_amplitude * (at.gauge_pressure - own[3]) - own[4]) / self.time_1;
+    }
+
+    fn area_force(&self, at: &Point, own: &[f64], force: f64) -> f64 {
+        let has_area = self.pressure_amplitude != 0.0 && at.gauge_pressure > 0.0;
+        if has_area { force * (1.0 + own[4] / at.gauge_pressure) } else { force }
     }
 
     fn effective_contraction(&self, _at: &Point, own: &[f64], contraction: f64) -> f64 {
@@ -77,10 +96,20 @@ impl Effect for Creep {
 
     fn sentence(&self) -> String {
         let one = |amplitude: f64, time: f64| format!("{:.1} % within {time:.1} s", 100.0 * amplitude);
-        let mut parts = one(self.amplitude_1, self.time_1);
-        if self.amplitude_2 != 0.0 {
-            parts += &format!(" and {}", one(self.amplitude_2, self.time_2));
+        let mut parts = Vec::new();
+        if self.amplitude_1 != 0.0 {
+            parts.push(one(self.amplitude_1, self.time_1));
         }
-        format!("The membrane creeps: of every change of length it gives way by {parts}.")
+        if self.amplitude_2 != 0.0 {
+            parts.push(one(self.amplitude_2, self.time_2));
+        }
+        let length = format!("of every change of length it gives way by {}", parts.join(" and "));
+        let pressure = format!("the pull of the pressure grows by {}", one(self.pressure_amplitude, self.time_1));
+        let all = match (parts.is_empty(), self.pressure_amplitude == 0.0) {
+            (false, true) => length,
+            (true, _) => pressure,
+            (false, false) => format!("{length}, and {pressure}"),
+        };
+        format!("The membrane creeps: {all}.")
     }
 }

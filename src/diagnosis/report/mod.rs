@@ -53,7 +53,16 @@ pub fn gain(diagnosis: &Diagnosis) -> String {
         "The extended model removes"
     };
     let (share, where_from) = (100.0 * diagnosis.improvement, &diagnosis.held_out);
-    format!("{what} {share:.0} % of the error, on samples that no fit saw: {where_from}.")
+    format!("{what} {share:.0} % of the error, on samples {}: {where_from}.", which_samples(diagnosis))
+}
+
+/// On what samples errors are given.
+fn which_samples(diagnosis: &Diagnosis) -> &'static str {
+    if diagnosis.saw_all {
+        "that the fit had to see, as those before do not tell the size precisely enough to foretell them"
+    } else {
+        "that no fit saw"
+    }
 }
 
 /// The experiment that tells a cause from its alternatives; `None` where none is needed.

@@ -2,7 +2,7 @@
 
 use super::curves::{compared, held_out_from, most_samples, over_time};
 use super::exposure::{Exposed, Residuals, SEEN};
-use super::{Made, display_unit, gain, headline, pictures};
+use super::{Made, display_unit, gain, headline, pictures, which_samples};
 use crate::Result;
 use crate::diagnosis::links::Variable;
 use crate::diagnosis::{Cause, Diagnosis, FittedParameter, Ranked, SignalErrors, Verdict};
@@ -27,7 +27,7 @@ pub fn html(diagnosis: &Diagnosis, nominal: &Parameters, recordings: &[Recording
     for (index, recording) in recordings.iter().enumerate() {
         let replays = [replay(nominal, recording)?, replay(&diagnosis.extended, recording)?];
         let signals = compared(recording, &replays[0]);
-        let held_out = held_out_from(&diagnosis.held_out, recording);
+        let held_out = held_out_from(&diagnosis.held_out, recording).filter(|_| !diagnosis.saw_all);
         curves.push(json!({
             "held_out_from": held_out,
             "signals": signals.iter().map(|s| over_time(diagnosis, recording, *s, &replays, most)).collect::<Vec<_>>(),
@@ -44,6 +44,7 @@ pub fn html(diagnosis: &Diagnosis, nominal: &Parameters, recordings: &[Recording
         verdict => verdict_word(diagnosis.verdict),
         headline => headline(diagnosis),
         gain => gain(diagnosis),
+        which_samples => which_samples(diagnosis),
         notes => notes(diagnosis, recordings),
         files => files.iter().map(|file| context! { name => file.name.clone(), purpose => file.purpose }).collect::<Vec<_>>(),
         causes => causes.map(|(cause, exposed)| cause_context(cause, *exposed, &residuals)).collect::<Vec<_>>(),
@@ -265,6 +266,7 @@ mod tests {
             signals: vec![SignalErrors { signal: Signal::Force, nominal_rms: 20.0, extended_rms: 2.0, noise_rms: 1.0 }],
             improvement: 0.9,
             held_out: "<i>.csv from 6.0 s".to_owned(),
+            saw_all: false,
             ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2, parameters: Vec::new() }],
             extended: Parameters::default(),
             corrections: vec![correction],
