@@ -6,6 +6,7 @@ use crate::least_squares::{self, Effort, Ended, Free, derivatives, linear_decrea
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 /// Corrections that every fit may make, in units of the declared tolerance of the nominal value: a muscle and its valve
 /// are never quite the preset. Damping is the least known coefficient, and other losses of a rig add to it.
@@ -18,6 +19,12 @@ const SHAPES: [(&str, f64); 3] = [("muscle.area_tilt", 0.4), ("muscle.area_bend"
 const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
 /// Of a fit whose parameters count.
 const EXACT: Effort = Effort { iterations: 20, small_decrease: 1e-5 };
+
+/// A form with at least so many starts has many minima: its size is looked for anew when what else is at work has changed,
+/// so many steps to either side, each this share of it, first coarse and then fine.
+const MANY_STARTS: usize = 10;
+const SCAN_STEPS: i32 = 20;
+const SCANS: [f64; 2] = [4e-3, 2e-4];
 
 /// Rounds of a fit that counts, and the relative gain of one below which it is the last.
 const MOST_ROUNDS: usize = 6;
@@ -254,6 +261,24 @@ impl<'a> Bench<'a> {
             }
         }
         best.map(|(fitted, _)| fitted)
+    }
+
+    /// A model at least as good, with sizes nearby of those effects whose error has many minima.
+    pub fn scanned(&self, fitted: &Fitted) -> Parameters {
+        let sizes = fitted.hypothesis.parts.iter().map(|part| part.effect.forms[part.form][0]);
+        let many = sizes.filter(|(_, starts)| starts.len() >= MANY_STARTS);
+        many.flat_map(|(size, _)| SCANS.map(|share| (size, share)))
+            .fold(fitted.parameters, |model, (size, share)| self.best_nearby(&model, size, share).unwrap_or(model))
+    }
+
+    fn best_nearby(&self, model: &Parameters, size: &str, share: f64) -> Option<Parameters> {
+        let (variable, value) = declared(model, size);
+        let nearby = (-SCAN_STEPS..=SCAN_STEPS).into_par_iter().filter_map(|k| {
+            let model = with_values(model, &[variable], &[value * (1.0 + f64::from(k) * share)]);
+            let squares = weighted(&self.data.residuals(&model)?, &self.weights).iter().map(|r| r * r).sum::<f64>();
+            Some((k.abs(), squares, model))
+        });
+        nearby.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(.., model)| model)
     }
 
     /// Sum of weighted squares.

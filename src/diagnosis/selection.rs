@@ -12,9 +12,9 @@ use std::collections::BTreeMap;
 const LEAST_EVIDENCE: f64 = 10.0;
 /// Odds up to which a rival explains the data as well as the best: 20 to 1, in natural logarithm.
 const RIVAL: f64 = 3.0;
-/// Share of the error beyond noise that the named causes together must explain: of all samples, and of those that the fit
-/// did not see.
-const LEAST_EXPLAINED: (f64, f64) = (0.95, 0.8);
+/// Share of the error beyond noise that the named causes together must explain: of all samples, twice what forms may leave
+/// ([`LEFT_BY_FORM`]) apart, and of those that the fit did not see.
+const LEAST_EXPLAINED: (f64, f64) = (0.98, 0.95);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
 const LEAST_FURTHER: f64 = 0.8;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
@@ -207,8 +207,10 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     fn finished(&self, judged: Judged) -> Judged {
-        let Fitted { hypothesis, parameters, .. } = &judged.fitted;
-        self.bench.exact_fit(hypothesis, parameters, Scope::All).map_or(judged.clone(), |fitted| self.judge(fitted))
+        let start = self.bench.scanned(&judged.fitted);
+        self.bench
+            .exact_fit(&judged.fitted.hypothesis, &start, Scope::All)
+            .map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
