@@ -228,7 +228,7 @@ impl Recording {
         *steps.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
-    /// The recording with samples no closer than `period` s, as far as at least [`THINNED_SAMPLES`] remain. Samples are left
+    /// The recording with samples no closer than `period` s, as far as at least a thousand remain. Samples are left
     /// out; the command is a weighted mean, its weight falling to zero at the next sample that stays, so that a step
     /// between two of them keeps its time.
     pub fn thinned(&self, period: f64) -> Self {

@@ -69,13 +69,7 @@ impl Effect for Creep {
     fn start(&self, at: &Point, own: &mut [f64]) {
         let relaxed = self.relaxed_share * at.contraction;
         let settled = self.settled_share * (at.contraction - relaxed);
-        own.copy_from_slice(&[
-            self.amplitude_1 * settled,
-            self.amplitude_2 * settled,
-            relaxed,
-            at.gauge_pressure,
-            0.0,
-        ]);
+        own.copy_from_slice(&[self.amplitude_1 * settled, self.amplitude_2 * settled, relaxed, at.gauge_pressure, 0.0]);
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
