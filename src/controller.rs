@@ -13,7 +13,8 @@ crate::variables::variables! {
     ///
     /// # Model
     /// u = u_ff + K_p e + K_i ∫e dt + D, e = setpoint − measured; D is K_d de/dt through a first-order filter with
-    /// time constant T_f. The command stays within its limits, and the integral rests while it is 1 mV beyond one.
+    /// time constant T_f. The command stays within its limits, and the integral rests while it is beyond one; without
+    /// a sample time it comes to rest over the first millivolt.
     ///
     /// # Validity
     /// The gains of the presets are those of `sinew tune`, rounded: on the linearised plant, 20–80 kg and contractions up to

@@ -251,7 +251,7 @@ impl<'a> Bench<'a> {
             let from = best.as_ref().map_or(*start, |(fitted, _)| fitted.parameters);
             let slopes = self.slopes_at(&from, &self.data.residuals(&from)?);
             let fitted = self.fit(hypothesis, &from, scope, &slopes, EXACT)?;
-            let cost = self.cost(&fitted, scope);
+            let cost = cost(&fitted.residuals, &self.data.weights(scope));
             let before = best.as_ref().map_or(f64::INFINITY, |(_, cost)| *cost);
             if cost < before {
                 best = Some((fitted, cost));
@@ -275,15 +275,9 @@ impl<'a> Bench<'a> {
         let (variable, value) = declared(model, size);
         let nearby = (-SCAN_STEPS..=SCAN_STEPS).into_par_iter().filter_map(|k| {
             let model = with_values(model, &[variable], &[value * (1.0 + f64::from(k) * share)]);
-            let squares = weighted(&self.data.residuals(&model)?, &self.weights).iter().map(|r| r * r).sum::<f64>();
-            Some((k.abs(), squares, model))
+            Some((k.abs(), cost(&self.data.residuals(&model)?, &self.weights), model))
         });
         nearby.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(.., model)| model)
-    }
-
-    /// Sum of weighted squares.
-    fn cost(&self, fitted: &Fitted, scope: Scope) -> f64 {
-        weighted(&fitted.residuals, &self.data.weights(scope)).iter().map(|r| r * r).sum()
     }
 
     fn fit(
@@ -452,6 +446,11 @@ pub(super) fn bounds(variables: &[&'static Variable], start: &Parameters) -> Vec
         Free { start, lower: variable.min, upper: variable.max, typical, prior: None }
     };
     variables.iter().map(bounds).collect()
+}
+
+/// Sum of weighted squares.
+fn cost(residuals: &[f64], weights: &[f64]) -> f64 {
+    weighted(residuals, weights).iter().map(|r| r * r).sum()
 }
 
 fn weighted(residuals: &[f64], weights: &[f64]) -> Vec<f64> {

@@ -11,7 +11,8 @@ crate::variables::variables! {
     ///
     /// # In the data
     /// Contraction drifts for seconds at constant measured pressure, unlike up and down; in a prescribed motion the force
-    /// does, with the pressure part also where the muscle is locked. A leak drifts in the pressure; hysteresis does not depend on time.
+    /// does, with the pressure part also where the muscle is locked. A leak drifts in the pressure; hysteresis does not
+    /// depend on time.
     ///
     /// # Validity
     /// 2 to 20 % of a step over 0.5 to 100 s. By default the muscle counts as relaxed where it starts, so that a

@@ -310,6 +310,14 @@ mod tests {
     }
 
     #[test]
+    fn page_says_where_the_fit_had_to_see_all_samples() {
+        let unseen = everything(Verdict::Explained, Vec::new());
+        let page = page_of(&Diagnosis { saw_all: true, ..unseen.clone() });
+        assert!(page.contains("that the fit had to see") && !page.contains("Held out from the fits"));
+        assert!(!page.contains("that no fit saw") && page_of(&unseen).contains("that no fit saw"));
+    }
+
+    #[test]
     fn page_of_an_unknown_cause_shows_where_it_is_seen() {
         let seen = "Where the error shows best";
         assert!(page_of(&everything(Verdict::Unexplained, Vec::new())).contains(seen));
