@@ -9,7 +9,7 @@
 //! J. Dormand, P. Prince (1980), A family of embedded Runge–Kutta formulae, doi 10.1016/0771-050X(80)90013-3;
 //! E. Hairer, S. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, II.4.
 
-/// Error of one step, relative to the scale of each state, that is accepted.
+/// Error of one step, relative to the scale of each state, that is accepted where nothing else is asked for.
 pub const TOLERANCE: f64 = 1e-8;
 const LARGEST_STEP: f64 = 0.05;
 const SMALLEST_STEP: f64 = 1e-9;
@@ -43,8 +43,8 @@ pub struct Failed {
 /// Advances `state` over `duration` seconds.
 ///
 /// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness(t0, y0, t1, y1)` is
-/// told of every accepted step; `scale` is the usual size of each state; `step` is the step proposed by the last call
-/// and is updated.
+/// told of every accepted step; `scale` is the usual size of each state, and `tolerance` the error of one step relative to
+/// it; `step` is the step proposed by the last call and is updated.
 ///
 /// # Errors
 /// [`Failed`] when a state is not finite, the step would fall below a nanosecond, or the steps are too many; `state` is
@@ -54,6 +54,7 @@ pub fn advance<const N: usize>(
     rates: impl Fn(f64, &[f64; N], &mut [f64; N]),
     mut witness: impl FnMut(f64, &[f64; N], f64, &[f64; N]),
     scale: &[f64; N],
+    tolerance: f64,
     state: &mut [f64; N],
     step: &mut f64,
     duration: f64,
@@ -68,6 +69,7 @@ pub fn advance<const N: usize>(
         let h = if last { rest } else { *step };
         let next = one_step(&rates, time, h, state, &mut stages);
         let (error, worst) = scaled_error(&stages, h, scale, state, &next);
+        let error = error / tolerance;
         if error <= 1.0 {
             witness(time, state, time + h, &next);
             *state = next;
@@ -142,7 +144,7 @@ fn scaled_error<const N: usize>(
             return (f64::INFINITY, i);
         }
         let size = scale[i].max(state[i].abs()).max(next[i].abs());
-        let error = (h * difference[i]).abs() / (TOLERANCE * size);
+        let error = (h * difference[i]).abs() / size;
         if error > largest {
             (largest, worst) = (error, i);
         }
@@ -164,7 +166,7 @@ mod tests {
         for call in [1e-4, 1e-3, 1e-2, 0.25, 1.0] {
             let (mut state, mut step) = ([1.0, 0.0, 1.0], 1e-3);
             for _ in 0..(1.0_f64 / call).round() as usize {
-                advance(rates, |_, _, _, _| {}, &[1.0, 10.0, 1.0], &mut state, &mut step, call).unwrap();
+                advance(rates, |_, _, _, _| {}, &[1.0, 10.0, 1.0], TOLERANCE, &mut state, &mut step, call).unwrap();
             }
             let exact = [10.0_f64.cos(), -10.0 * 10.0_f64.sin(), (-3.0_f64).exp()];
             for (is, should) in state.iter().zip(exact) {
@@ -176,13 +178,13 @@ mod tests {
     #[test]
     fn an_explosion_is_reported_with_its_time() {
         let explode = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = y[0] * y[0];
-        let failed = advance(explode, |_, _, _, _| {}, &[1.0], &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
+        let failed = advance(explode, |_, _, _, _| {}, &[1.0], TOLERANCE, &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
         assert!((failed.after - 1.0).abs() < 1e-3, "1/(1 - t) ends at 1 s, not {}", failed.after);
     }
 
     #[test]
     fn a_stiffness_without_sense_ends() {
         let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e12 * y[0];
-        assert!(advance(stiff, |_, _, _, _| {}, &[1.0], &mut [1.0], &mut 1e-3, 1.0).is_err());
+        assert!(advance(stiff, |_, _, _, _| {}, &[1.0], TOLERANCE, &mut [1.0], &mut 1e-3, 1.0).is_err());
     }
 }

@@ -41,6 +41,7 @@ pub trait State: Copy + Send {
         rates: impl Fn(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self),
         scale: &Self,
+        tolerance: f64,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed>;
@@ -54,10 +55,11 @@ pub trait State: Copy + Send {
         rates: impl Fn(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self),
         scale: &Self,
+        tolerance: f64,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
-        self.advance(rates, witness, scale, step, duration)
+        self.advance(rates, witness, scale, tolerance, step, duration)
     }
 }
 
@@ -75,13 +77,14 @@ impl<const N: usize> State for [f64; N] {
         rates: impl Fn(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self),
         scale: &Self,
+        tolerance: f64,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
         if N == 0 {
             return Ok(());
         }
-        integrator::advance(rates, witness, scale, self, step, duration)
+        integrator::advance(rates, witness, scale, tolerance, self, step, duration)
     }
 }
 
@@ -114,6 +117,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         rates: impl Fn(f64, &Self, &mut Self),
         mut witness: impl FnMut(f64, &Self, f64, &Self),
         scale: &Self,
+        tolerance: f64,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
@@ -123,7 +127,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
             *out = all.0;
         };
         let witness = |t0: f64, y0: &[f64; N], t1: f64, y1: &[f64; N]| witness(t0, &Self(*y0), t1, &Self(*y1));
-        self.0.advance(rates, witness, &scale.0, step, duration)
+        self.0.advance(rates, witness, &scale.0, tolerance, step, duration)
     }
     #[inline]
     fn advance_own(
@@ -131,6 +135,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         rates: impl Fn(f64, &Self, &mut Self),
         mut witness: impl FnMut(f64, &Self, f64, &Self),
         scale: &Self,
+        tolerance: f64,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
@@ -143,7 +148,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         let witness = |t0: f64, y0: &[f64; OWN], t1: f64, y1: &[f64; OWN]| {
             witness(t0, &resting.with_own(y0), t1, &resting.with_own(y1));
         };
-        own.advance(rates, witness, &scale.own(), step, duration)?;
+        own.advance(rates, witness, &scale.own(), tolerance, step, duration)?;
         *self = resting.with_own(&own);
         Ok(())
     }
@@ -344,6 +349,8 @@ pub struct Simulator<S: System> {
     pub inputs: S::Inputs,
     /// Derivatives of the inputs, per second; they hold for one step.
     pub slopes: S::Inputs,
+    /// See [`integrator::advance`].
+    pub tolerance: f64,
     time: f64,
     state: S::State,
     step: f64,
@@ -358,7 +365,8 @@ impl<S: System> Simulator<S> {
     pub fn new(parameters: Parameters) -> Self {
         let (inputs, slopes) = (S::Inputs::default(), S::Inputs::default());
         let memory = S::Memory::default();
-        Self { parameters, inputs, slopes, time: 0.0, state: S::State::ZERO, step: FIRST_STEP, memory }
+        let (tolerance, state) = (integrator::TOLERANCE, S::State::ZERO);
+        Self { parameters, inputs, slopes, tolerance, time: 0.0, state, step: FIRST_STEP, memory }
     }
 
     /// Time in s.
@@ -423,7 +431,7 @@ impl<S: System> Simulator<S> {
 
     /// State and proposed step after a duration in s. Of the simulator only its memory goes along.
     fn integrate(&mut self, duration: f64) -> Result<(S::State, f64)> {
-        let Self { ref parameters, inputs, slopes, time, mut state, mut step, ref mut memory } = *self;
+        let Self { ref parameters, inputs, slopes, tolerance, time, mut state, mut step, ref mut memory } = *self;
         let coming = Step { parameters, time, state, inputs, slopes, duration };
         let extent = S::extent(parameters);
         S::expect(memory, &coming);
@@ -435,7 +443,7 @@ impl<S: System> Simulator<S> {
                     let rates = |t: f64, y: &S::State, dy: &mut S::State| {
                         S::nominal_rates(parameters, &felt.along(&slopes, t), y, dy);
                     };
-                    state.advance_own(rates, |_, _, _, _| {}, &S::SCALE, &mut step, span)
+                    state.advance_own(rates, |_, _, _, _| {}, &S::SCALE, tolerance, &mut step, span)
                 }
                 Extent::Stateless | Extent::Full => {
                     let rates = |t: f64, y: &S::State, dy: &mut S::State| {
@@ -446,9 +454,9 @@ impl<S: System> Simulator<S> {
                         S::witness(memory, parameters, [start + t0, start + t1], [y0, y1]);
                     };
                     if extent == Extent::Full {
-                        state.advance(rates, witness, &S::SCALE, &mut step, span)
+                        state.advance(rates, witness, &S::SCALE, tolerance, &mut step, span)
                     } else {
-                        state.advance_own(rates, witness, &S::SCALE, &mut step, span)
+                        state.advance_own(rates, witness, &S::SCALE, tolerance, &mut step, span)
                     }
                 }
             };

@@ -1,6 +1,7 @@
 //! Models over time: the replay of a recording, and the closed loop.
 
 use crate::controller::PidFeedForward;
+use crate::integrator::TOLERANCE;
 use crate::measurement::{Recording, Signal};
 use crate::model::{Simulator, System};
 use crate::parameters::Parameters;
@@ -51,7 +52,17 @@ const START_SAMPLES: usize = 5;
 /// # Errors
 /// [`crate::Error::NoEquilibrium`], [`crate::Error::Diverged`].
 pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
-    let Some(command) = recording.bridged(Signal::Command) else { return replay_muscle(parameters, recording) };
+    replay_within(parameters, recording, TOLERANCE)
+}
+
+/// As [`replay`], with a tolerance of the integration as in [`crate::integrator::advance`].
+///
+/// # Errors
+/// As [`replay`].
+pub fn replay_within(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
+    let Some(command) = recording.bridged(Signal::Command) else {
+        return replay_pull(parameters, recording, tolerance);
+    };
     let mut parameters = *parameters;
     parameters.initial.gauge_pressure = initial_pressure(&parameters, recording, command[0]);
     let time = &recording.time;
@@ -59,7 +70,7 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
         parameters.load.mass = mass;
         let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
-        return follow::<PneumaticMuscle>(&parameters, time, inputs, shown, None, &[]);
+        return follow::<PneumaticMuscle>(&parameters, time, tolerance, inputs, shown, None, &[]);
     }
     let motion = Motion::of(&parameters, recording);
     let inputs = |k: usize, pull: f64| ActuatorInputs {
@@ -67,7 +78,15 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
         contraction: motion.contraction(k, pull),
         contraction_velocity: motion.velocity[k],
     };
-    follow::<PneumaticActuator>(&parameters, time, inputs, driven_readings, motion.pull(), &[Signal::Contraction])
+    follow::<PneumaticActuator>(
+        &parameters,
+        time,
+        tolerance,
+        inputs,
+        driven_readings,
+        motion.pull(),
+        &[Signal::Contraction],
+    )
 }
 
 /// Simulates the muscle alone, from measured pressure and contraction to force: free of errors of valve and load.
@@ -75,6 +94,10 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
 /// # Errors
 /// As [`replay`].
 pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
+    replay_pull(parameters, recording, TOLERANCE)
+}
+
+fn replay_pull(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
     let nothing = || vec![0.0; recording.time.len()];
     let mut pressure = recording.bridged(Signal::GaugePressure).unwrap_or_else(nothing);
     let start = recording.time[0];
@@ -88,7 +111,7 @@ pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<R
         contraction_velocity: motion.velocity[k],
     };
     let given = [Signal::Contraction, Signal::GaugePressure];
-    follow::<MuscleAlone>(parameters, &recording.time, inputs, driven_readings, motion.pull(), &given)
+    follow::<MuscleAlone>(parameters, &recording.time, tolerance, inputs, driven_readings, motion.pull(), &given)
 }
 
 /// Gauge pressure in Pa at the start of a recording.
@@ -168,12 +191,14 @@ fn driven_readings(out: &ActuatorOutputs) -> [f64; 3] {
 fn follow<S: System>(
     parameters: &Parameters,
     time: &[f64],
+    tolerance: f64,
     inputs: impl Fn(usize, f64) -> S::Inputs,
     shown: impl Fn(&S::Outputs) -> [f64; 3],
     pull: Option<fn(&S::Outputs) -> f64>,
     given: &[Signal],
 ) -> Result<Replay> {
     let mut simulator = Simulator::<S>::new(*parameters);
+    simulator.tolerance = tolerance;
     simulator.inputs = inputs(0, 0.0);
     // What settles counts from the start of the recording.
     simulator.initialize(0.0)?;

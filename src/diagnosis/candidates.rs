@@ -20,9 +20,9 @@ const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
 /// Of a fit whose parameters count.
 const EXACT: Effort = Effort { iterations: 20, small_decrease: 1e-5 };
 
-/// A form with at least so many starts has many minima: its size is looked for anew when what else is at work has changed,
-/// so many steps to either side, each this share of it, first coarse and then fine.
+/// A form with at least so many starts has many minima.
 const MANY_STARTS: usize = 10;
+/// A size with many minima is looked for so many steps to either side, each this share of it, first coarse and then fine.
 const SCAN_STEPS: i32 = 20;
 const SCANS: [f64; 2] = [4e-3, 2e-4];
 
@@ -266,8 +266,9 @@ impl<'a> Bench<'a> {
     /// A model at least as good, with sizes nearby of those effects whose error has many minima.
     pub fn scanned(&self, fitted: &Fitted) -> Parameters {
         let sizes = fitted.hypothesis.parts.iter().map(|part| part.effect.forms[part.form][0]);
-        let many = sizes.filter(|(_, starts)| starts.len() >= MANY_STARTS);
-        many.flat_map(|(size, _)| SCANS.map(|share| (size, share)))
+        sizes
+            .filter(many_minima)
+            .flat_map(|(size, _)| SCANS.map(|share| (size, share)))
             .fold(fitted.parameters, |model, (size, share)| self.best_nearby(&model, size, share).unwrap_or(model))
     }
 
@@ -435,6 +436,16 @@ impl<'a> Bench<'a> {
         }
         (bread, filling)
     }
+}
+
+/// Whether the error has many minima over the size of an effect in some form: it must be looked for anew when what else is at
+/// work has changed.
+pub fn has_many_minima(effect: &Description) -> bool {
+    effect.forms.iter().any(|form| many_minima(&form[0]))
+}
+
+fn many_minima((_, starts): &Freed) -> bool {
+    starts.len() >= MANY_STARTS
 }
 
 /// Bounds of parameters of effects; a change of the size of the start matters.

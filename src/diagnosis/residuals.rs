@@ -1,9 +1,10 @@
 //! Residuals of a model against recordings: how large they are, what noise alone would leave, which of them no fit sees.
 
 use super::noise::{self, Noise};
+use crate::integrator;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
-use crate::simulation::{OUTPUTS, replay};
+use crate::simulation::{OUTPUTS, replay, replay_within};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -41,6 +42,8 @@ pub struct Data<'a> {
     segments: Vec<Segment>,
     noise: BTreeMap<Signal, Noise>,
     tolerance: f64,
+    /// Tolerance of the integration, see [`integrator::advance`].
+    pub integration: f64,
 }
 
 /// How large the residuals of one signal in one recording are.
@@ -85,6 +88,7 @@ impl<'a> Data<'a> {
             segments: segments(recordings, nominal)?,
             noise: BTreeMap::new(),
             tolerance,
+            integration: integrator::TOLERANCE,
         };
         let judged: Vec<Signal> = data.signals().into_iter().filter(|signal| data.is_judged(*signal)).collect();
         data.segments.retain(|segment| judged.contains(&segment.signal));
@@ -173,8 +177,8 @@ impl<'a> Data<'a> {
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
     /// simulated.
     pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
-        let replays: Vec<_> =
-            self.recordings.par_iter().map(|recording| replay(parameters, recording).ok()).collect::<Option<_>>()?;
+        let replayed = |recording| replay_within(parameters, recording, self.integration).ok();
+        let replays: Vec<_> = self.recordings.par_iter().map(replayed).collect::<Option<_>>()?;
         let mut all = Vec::with_capacity(self.segments.last().map_or(0, |segment| segment.range.end));
         for segment in &self.segments {
             let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);

@@ -1,7 +1,7 @@
 //! Which causes are named, if any: forward selection over a beam of hypotheses, with refusal in both directions.
 
 use super::Verdict;
-use super::candidates::{Bench, Fitted, Part, Refined, Start, neutralised};
+use super::candidates::{Bench, Fitted, Part, Refined, Start, has_many_minima, neutralised};
 use super::residuals::{Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
@@ -17,6 +17,8 @@ const RIVAL: f64 = 3.0;
 const LEAST_EXPLAINED: (f64, f64) = (0.98, 0.95);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
 const LEAST_FURTHER: f64 = 0.8;
+/// The same before the hypothesis is refined: fits of two effects that came to be named began at 0.87 and more.
+const MAY_GO_FURTHER: f64 = 0.5;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
 /// Share of a signal's error that a named effect may leave without a further effect being looked for: a tenth of its
@@ -135,7 +137,7 @@ impl<'a, 'b> Search<'a, 'b> {
             singles = self.judged_anew(singles);
         }
         let mut levels = vec![self.refined_best(singles)];
-        while levels.len() < MOST_EFFECTS && self.something_is_left(levels.last()?) {
+        while levels.len() < MOST_EFFECTS && self.is_worth_going_on(&levels) {
             let next = self.next_level(levels.last()?, &starts);
             levels.push(next);
         }
@@ -169,11 +171,18 @@ impl<'a, 'b> Search<'a, 'b> {
         (self.fitted(&self.baseline, starts, FITTED.0), best)
     }
 
-    /// The most promising hypotheses with one effect more, the best first.
-    fn extend(&self, base: &Fitted, from: &[(Part, usize)]) -> Vec<Judged> {
+    /// The most promising hypotheses with one effect more, the best first. The base that leads is worth a look at every start;
+    /// the others are extended from where each effect alone is best fitted, but for those whose error has many minima.
+    fn extend(&self, base: &Fitted, leads: bool, from: &[(Part, usize)]) -> Vec<Judged> {
         let others = from.par_iter().filter(|(part, _)| !base.hypothesis.has(part.effect.name));
-        let starts = others.filter_map(|(part, choice)| Some(vec![self.bench.start(base, *part, *choice)?])).collect();
-        self.fitted(base, starts, FITTED.1)
+        let starts = others.map(|(part, choice)| {
+            if leads || has_many_minima(part.effect) {
+                self.bench.starts(base, part.effect)
+            } else {
+                self.bench.start(base, *part, *choice).into_iter().collect()
+            }
+        });
+        self.fitted(base, starts.filter(|starts| !starts.is_empty()).collect(), FITTED.1)
     }
 
     /// Fits of the most promising effects, each from its most promising starts, the best first.
@@ -244,10 +253,10 @@ impl<'a, 'b> Search<'a, 'b> {
         Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
     }
 
-    /// Whether the best of the hypotheses leaves an error that is worth a further effect.
-    fn something_is_left(&self, level: &[Judged]) -> bool {
-        let best = level.first().filter(|best| best.evidence > LEAST_EVIDENCE);
-        best.is_some_and(|best| !self.is_enough(&best.fitted.losses)) && !self.is_sound(&self.baseline.losses)
+    /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect.
+    fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
+        let leading = self.leading(levels).filter(|best| best.fitted.hypothesis.parts.len() == levels.len());
+        leading.is_some_and(|best| !self.is_enough(&best.fitted.losses)) && !self.is_sound(&self.baseline.losses)
     }
 
     /// Whether residuals are small enough that nothing more is looked for.
@@ -258,8 +267,8 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
         let mut next: Vec<Judged> = Vec::new();
-        for base in bases(level) {
-            for judged in self.extend(&base.fitted, starts) {
+        for (rank, base) in bases(level).into_iter().enumerate() {
+            for judged in self.extend(&base.fitted, rank == 0, starts) {
                 let same = |known: &Judged| known.fitted.hypothesis.names() == judged.fitted.hypothesis.names();
                 match next.iter().position(same) {
                     Some(k) if next[k].score < judged.score => next[k] = judged,
@@ -267,6 +276,9 @@ impl<'a, 'b> Search<'a, 'b> {
                     None => next.push(judged),
                 }
             }
+        }
+        if let Some(fewer) = possible(level) {
+            next.retain(|more| further(fewer, more) > MAY_GO_FURTHER);
         }
         self.refined_best(sorted(next))
     }
@@ -277,23 +289,21 @@ impl<'a, 'b> Search<'a, 'b> {
         beyond_noise(losses).into_iter().all(|(signal, beyond)| beyond <= allowance(signal))
     }
 
-    /// The best hypothesis of all levels, without effects that it can spare.
-    fn best(&self, levels: &[Vec<Judged>]) -> Option<Judged> {
+    /// The best hypothesis of all levels, each of which must be worth its effects.
+    fn leading<'l>(&self, levels: &'l [Vec<Judged>]) -> Option<&'l Judged> {
         let shows = |best: &&Judged| self.shows(&self.baseline.losses, &best.fitted.losses);
         let mut best = possible(&levels[0]).filter(|best| best.evidence > LEAST_EVIDENCE).filter(shows)?;
         for level in &levels[1..] {
             let Some(more) = possible(level).filter(|more| self.is_worth(best, more)) else { break };
             best = more;
         }
-        Some(self.pruned(best.clone()))
+        Some(best)
     }
 
     /// Whether a hypothesis with more effects is worth them: it pays, and explains a good part of what is left without.
     fn is_worth(&self, fewer: &Judged, more: &Judged) -> bool {
-        let left = total(&beyond_noise(&fewer.fitted.losses));
-        let further = 1.0 - total(&beyond_noise(&more.fitted.losses)) / left.max(f64::MIN_POSITIVE);
         evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE
-            && further > LEAST_FURTHER
+            && further(fewer, more) > LEAST_FURTHER
             && self.shows(&fewer.fitted.losses, &more.fitted.losses)
     }
 
@@ -336,7 +346,7 @@ impl<'a, 'b> Search<'a, 'b> {
             })
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
-        let Some(best) = self.best(&levels) else { return refused(wrong) };
+        let Some(best) = self.leading(&levels).map(|best| self.pruned(best.clone())) else { return refused(wrong) };
         if best.explained < LEAST_EXPLAINED.0 {
             return refused(wrong);
         }
@@ -405,6 +415,12 @@ impl<'a, 'b> Search<'a, 'b> {
             of_other[&signal] <= NEGLIGIBLE.max(alike.min(LEFT_BY_FORM * before))
         })
     }
+}
+
+/// Share of what a hypothesis leaves that another one explains.
+fn further(fewer: &Judged, more: &Judged) -> f64 {
+    let [left, after] = [fewer, more].map(|judged| total(&beyond_noise(&judged.fitted.losses)));
+    1.0 - after / left.max(f64::MIN_POSITIVE)
 }
 
 /// The best hypothesis whose effects are no larger than they can be.
