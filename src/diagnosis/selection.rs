@@ -265,22 +265,40 @@ impl<'a, 'b> Search<'a, 'b> {
         after.iter().all(|(signal, left)| *left <= NEGLIGIBLE.max(LEFT_BY_FORM * before[signal]))
     }
 
+    /// The most promising hypotheses with one effect more than those of a level, the best first.
+    ///
+    /// Where the best still leaves something, each of its earlier effects is exchanged for others: alone, a wrong one may
+    /// have looked better.
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
-        let mut next: Vec<Judged> = Vec::new();
-        for (rank, base) in bases(level).into_iter().enumerate() {
-            for judged in self.extend(&base.fitted, rank == 0, starts) {
-                let same = |known: &Judged| known.fitted.hypothesis.names() == judged.fitted.hypothesis.names();
-                match next.iter().position(same) {
-                    Some(k) if next[k].score < judged.score => next[k] = judged,
-                    Some(_) => (),
-                    None => next.push(judged),
-                }
+        let bases = bases(level).into_iter().enumerate();
+        let more = bases.flat_map(|(rank, base)| self.extend(&base.fitted, rank == 0, starts)).collect();
+        let mut next = self.worth_refining(level, more);
+        let Some(best) = next.first().filter(|best| !self.is_enough(&best.fitted.losses)) else { return next };
+        let earlier = best.fitted.hypothesis.parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
+        let fewer = earlier.iter().filter_map(|part| self.without(best, part));
+        let mut exchanged: Vec<Judged> = fewer.flat_map(|base| self.extend(&base.fitted, false, starts)).collect();
+        exchanged.retain(|judged| !next.iter().any(|known| same_effects(known, judged)));
+        next.extend(self.worth_refining(level, exchanged));
+        sorted(next)
+    }
+
+    /// Of hypotheses those that may be worth more effects than a level has, each once, refined, the best first.
+    fn worth_refining(&self, level: &[Judged], more: Vec<Judged>) -> Vec<Judged> {
+        let mut once: Vec<Judged> = Vec::new();
+        for judged in sorted(more) {
+            let may_be = possible(level).is_none_or(|fewer| further(fewer, &judged) > MAY_GO_FURTHER);
+            if may_be && !once.iter().any(|known| same_effects(known, &judged)) {
+                once.push(judged);
             }
         }
-        if let Some(fewer) = possible(level) {
-            next.retain(|more| further(fewer, more) > MAY_GO_FURTHER);
-        }
-        self.refined_best(sorted(next))
+        self.refined_best(once)
+    }
+
+    /// A hypothesis fitted without one of its effects.
+    fn without(&self, judged: &Judged, part: &Part) -> Option<Judged> {
+        let start = neutralised(&judged.fitted.parameters, part.effect);
+        let hypothesis = judged.fitted.hypothesis.without(part.effect.name);
+        Some(self.judge(self.bench.exact_fit(&hypothesis, &start, Scope::All)?))
     }
 
     /// Whether an error is no reason to call a model wrong.
@@ -321,11 +339,7 @@ impl<'a, 'b> Search<'a, 'b> {
         if parts.len() < 2 {
             return judged;
         }
-        let fewer = parts.par_iter().filter_map(|part| {
-            let start = neutralised(&judged.fitted.parameters, part.effect);
-            let hypothesis = judged.fitted.hypothesis.without(part.effect.name);
-            Some(self.judge(self.bench.exact_fit(&hypothesis, &start, Scope::All)?))
-        });
+        let fewer = parts.par_iter().filter_map(|part| self.without(&judged, part));
         match fewer.max_by(|a, b| a.score.total_cmp(&b.score)) {
             Some(fewer) if !self.is_worth(&fewer, &judged) => self.pruned(fewer),
             _ => judged,
@@ -397,8 +411,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// is not the best.
     fn rivals<'l>(&self, best: &Judged, level: &'l [Judged]) -> Vec<&'l Judged> {
         let possible = level.iter().filter(|other| {
-            other.fitted.hypothesis.names() != best.fitted.hypothesis.names()
-                && !other.fitted.hypothesis.is_impossible(&other.fitted.parameters)
+            !same_effects(other, best) && !other.fitted.hypothesis.is_impossible(&other.fitted.parameters)
         });
         let (equal, behind): (Vec<_>, Vec<_>) =
             possible.partition(|other| evidence(&other.fitted, &best.fitted) < RIVAL);
@@ -421,6 +434,10 @@ impl<'a, 'b> Search<'a, 'b> {
 fn further(fewer: &Judged, more: &Judged) -> f64 {
     let [left, after] = [fewer, more].map(|judged| total(&beyond_noise(&judged.fitted.losses)));
     1.0 - after / left.max(f64::MIN_POSITIVE)
+}
+
+fn same_effects(a: &Judged, b: &Judged) -> bool {
+    a.fitted.hypothesis.names() == b.fitted.hypothesis.names()
 }
 
 /// The best hypothesis whose effects are no larger than they can be.

@@ -7,7 +7,7 @@ crate::variables::variables! {
     /// The membrane feels x − d₁ − d₂, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
     /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing
     /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The area feels p + d_p, with
-    /// τ₁ dd_p/dt + d_p = a_p (p − p(0)), `pressure_amplitude` a_p.
+    /// τ₁ dd_p/dt + d_p = a_p (p − p(0)), `pressure_amplitude` a_p. While a drift goes back, its time is `return_ratio` τ.
     ///
     /// # In the data
     /// Contraction drifts for seconds at constant measured pressure, unlike up and down; in a prescribed motion the force
@@ -20,7 +20,8 @@ crate::variables::variables! {
     ///
     /// # Reference
     /// Kelvin–Voigt model of viscoelasticity; for muscles T. Minh et al. (2010),
-    /// doi 10.1016/j.mechatronics.2010.04.003 (creep and hysteresis of a McKibben muscle).
+    /// doi 10.1016/j.mechatronics.2010.04.003 (creep and hysteresis of a McKibben muscle). That rubber recovers at another
+    /// pace than it gives way: I. Ward, J. Sweeney (2012), Mechanical Properties of Solid Polymers, ch. 11.
     pub struct Creep in "creep." as Tunable {
         /// Drift per contraction, first element
         amplitude_1: f64 = 0.0, ONE, (-0.5..=1.0);
@@ -36,6 +37,16 @@ crate::variables::variables! {
         settled_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Drift of the pressure that the braid feels, per pressure
         pressure_amplitude: f64 = 0.0, ONE, (-0.5..=1.0);
+        /// Time in which a drift goes back, relative to that in which it grows
+        return_ratio: f64 = 1.0, ONE, (0.05..=20.0);
+    }
+}
+
+impl Creep {
+    /// Rate of a drift that goes for `aim` with a time constant.
+    fn rate(&self, drift: f64, aim: f64, time: f64) -> f64 {
+        let lack = aim - drift;
+        lack / if drift * lack < 0.0 { self.return_ratio * time } else { time }
     }
 }
 
@@ -58,6 +69,7 @@ impl Effect for Creep {
             ("creep.relaxed_share", &[0.5]),
             ("creep.settled_share", &[0.5]),
             ("creep.pressure_amplitude", &[0.05]),
+            ("creep.return_ratio", &[1.5]),
         ],
     };
     /// Both drifts, the contraction and the pressure where nothing drifts, and the drift of the pressure.
@@ -75,9 +87,9 @@ impl Effect for Creep {
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let strain = at.contraction - own[2];
-        rates[0] = (self.amplitude_1 * strain - own[0]) / self.time_1;
-        rates[1] = (self.amplitude_2 * strain - own[1]) / self.time_2;
-        rates[4] = (self.pressure_amplitude * (at.gauge_pressure - own[3]) - own[4]) / self.time_1;
+        rates[0] = self.rate(own[0], self.amplitude_1 * strain, self.time_1);
+        rates[1] = self.rate(own[1], self.amplitude_2 * strain, self.time_2);
+        rates[4] = self.rate(own[4], self.pressure_amplitude * (at.gauge_pressure - own[3]), self.time_1);
     }
 
     fn area_force(&self, at: &Point, own: &[f64], force: f64) -> f64 {

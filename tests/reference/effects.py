@@ -64,6 +64,24 @@ class Creep(Plant):
         return super().static_force(pressure, x - own[0] - own[1], own)
 
 
+class UnevenCreep(Creep):
+    """The first element takes twice as long to come back as to give way."""
+
+    own_scales = (0.1,)
+
+    def own_start(self, x):
+        self.relaxed = x
+        return [0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        aim, drift = 0.1 * (x - self.relaxed), own[0]
+        grows = aim >= drift if drift > 0 else aim <= drift
+        return [(aim - drift) / (1.5 if grows or drift == 0 else 3.0)]
+
+    def static_force(self, pressure, x, own):
+        return Plant.static_force(self, pressure, x - own[0], own)
+
+
 class PressureCreep(Plant):
     """A share of what the pressure was on the mean of the last seconds is felt on top, less that of the start."""
 
@@ -200,6 +218,7 @@ class Case:
 
 CASES = [
     Case("creep", Creep(), STAIRS),
+    Case("uneven_creep", UnevenCreep(), STAIRS),
     Case("pressure_creep", PressureCreep(), STAIRS),
     Case("resonance", Resonance(), STAIRS),
     Case("dead_time", DeadTime(), RAMPS),
