@@ -35,8 +35,10 @@ const UNEXPLAINED: f64 = 6.5;
 const BEAM: usize = 3;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
-/// Candidates that are fitted, of those that look promising: for the first effect, and for further ones.
-const FITTED: (usize, usize) = (6, 5);
+/// Candidates that are fitted, of those that look promising: for the first effect, and for further ones; and the share of the
+/// best one's promise from which on up to twice as many are, since then the promise does not tell which.
+const FITTED: (usize, usize) = (9, 5);
+const AS_PROMISING: f64 = 0.98;
 /// Starts from which a candidate is fitted, and the share of the first one's promise that a further one must have.
 const STARTS: usize = 2;
 const ALSO_PROMISING: f64 = 0.5;
@@ -96,6 +98,11 @@ fn beyond_noise(losses: &[Loss]) -> BTreeMap<Signal, f64> {
         *count += loss.samples as f64;
     }
     sums.into_iter().map(|(signal, (sum, count))| (signal, (sum / count - 1.0).max(0.0))).collect()
+}
+
+/// What may be left of a signal's error because the form of an effect is never known exactly.
+fn left_by_form(before: f64) -> f64 {
+    NEGLIGIBLE.max(LEFT_BY_FORM * before)
 }
 
 fn total(beyond_noise: &BTreeMap<Signal, f64>) -> f64 {
@@ -188,7 +195,9 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Fits of the most promising effects, each from its most promising starts, the best first.
     fn fitted(&self, base: &Fitted, mut starts: Vec<Vec<Start>>, most: usize) -> Vec<Judged> {
         starts.sort_by(|a, b| b[0].promise.total_cmp(&a[0].promise));
-        starts.truncate(most);
+        let as_good = AS_PROMISING * starts.first().map_or(0.0, |best| best[0].promise);
+        let equal = starts.iter().take_while(|starts| starts[0].promise >= as_good).count();
+        starts.truncate(equal.clamp(most, 2 * most));
         let best = |starts: Vec<Start>| {
             let also = ALSO_PROMISING * starts[0].promise;
             let fits = starts.iter().take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
@@ -199,18 +208,22 @@ impl<'a, 'b> Search<'a, 'b> {
         sorted(starts.into_par_iter().filter_map(best).collect())
     }
 
-    /// The same, the best of them with their last effect, and the very best with all of its effects, refined and fitted to the
-    /// end: what a fit left undone would else be credited to the next effect. Where the very best leaves nothing to look for, only those that may rival it are.
-    fn refined_best(&self, mut judged: Vec<Judged>) -> Vec<Judged> {
-        let mut rest = judged.split_off(BEAM.min(judged.len()));
-        let mut others = judged.into_iter();
-        let Some(best) = others.next().map(|best| self.finished(self.refined(best))) else { return rest };
+    /// The same, those that are carried on with their last effect, and the very best with all of its effects, refined and
+    /// fitted to the end: what a fit left undone would else be credited to the next effect. Where the very best leaves nothing
+    /// to look for, only those that may rival it are, with all of theirs.
+    fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
+        let ranks = carried_on(&judged);
+        let mut others = judged.into_iter().enumerate();
+        let Some(best) = others.next().map(|(_, best)| self.finished(self.refined(best))) else { return Vec::new() };
         let is_enough = self.is_enough(&best.fitted.losses);
-        let (close, behind): (Vec<_>, Vec<_>) = others.partition(|other| !is_enough || other.explained > MAY_RIVAL);
-        rest.extend(behind);
-        let refined = close.into_par_iter().map(|judged| {
+        let is_close = |(rank, other): &(usize, Judged)| {
+            if is_enough { *rank < BEAM && other.explained > MAY_RIVAL } else { ranks.contains(rank) }
+        };
+        let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
+        let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
+        let refined = close.into_par_iter().map(|(_, judged)| {
             let last = judged.fitted.hypothesis.parts.len() - 1;
-            self.finished(self.part_refined(judged, last))
+            self.finished(if is_enough { self.refined(judged) } else { self.part_refined(judged, last) })
         });
         sorted(refined.chain([best]).chain(rest).collect())
     }
@@ -261,8 +274,24 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Whether residuals are small enough that nothing more is looked for.
     fn is_enough(&self, losses: &[Loss]) -> bool {
-        let (before, after) = (beyond_noise(&self.baseline.losses), beyond_noise(losses));
-        after.iter().all(|(signal, left)| *left <= NEGLIGIBLE.max(LEFT_BY_FORM * before[signal]))
+        let before = beyond_noise(&self.baseline.losses);
+        beyond_noise(losses).iter().all(|(signal, left)| *left <= left_by_form(before[signal]))
+    }
+
+    /// Share of what a hypothesis leaves that another one explains, in the signals in which it leaves more than forms may.
+    fn further(&self, fewer: &Judged, more: &Judged) -> f64 {
+        let [before, left, after] =
+            [&self.baseline, &fewer.fitted, &more.fitted].map(|fitted| beyond_noise(&fitted.losses));
+        let (mut worth, mut still) = (0.0, 0.0);
+        for (signal, left) in left {
+            if left > left_by_form(before[&signal]) {
+                worth += left;
+                still += after[&signal];
+            } else {
+                still += (after[&signal] - left).max(0.0);
+            }
+        }
+        if worth > 0.0 { 1.0 - still / worth } else { 0.0 }
     }
 
     /// The most promising hypotheses with one effect more than those of a level, the best first.
@@ -270,8 +299,8 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Where the best still leaves something, each of its earlier effects is exchanged for others: alone, a wrong one may
     /// have looked better.
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
-        let bases = bases(level).into_iter().enumerate();
-        let more = bases.flat_map(|(rank, base)| self.extend(&base.fitted, rank == 0, starts)).collect();
+        let bases = carried_on(level).into_iter();
+        let more = bases.flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, starts)).collect();
         let mut next = self.worth_refining(level, more);
         let Some(best) = next.first().filter(|best| !self.is_enough(&best.fitted.losses)) else { return next };
         let earlier = best.fitted.hypothesis.parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
@@ -286,7 +315,7 @@ impl<'a, 'b> Search<'a, 'b> {
     fn worth_refining(&self, level: &[Judged], more: Vec<Judged>) -> Vec<Judged> {
         let mut once: Vec<Judged> = Vec::new();
         for judged in sorted(more) {
-            let may_be = possible(level).is_none_or(|fewer| further(fewer, &judged) > MAY_GO_FURTHER);
+            let may_be = possible(level).is_none_or(|fewer| self.further(fewer, &judged) > MAY_GO_FURTHER);
             if may_be && !once.iter().any(|known| same_effects(known, &judged)) {
                 once.push(judged);
             }
@@ -321,7 +350,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Whether a hypothesis with more effects is worth them: it pays, and explains a good part of what is left without.
     fn is_worth(&self, fewer: &Judged, more: &Judged) -> bool {
         evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE
-            && further(fewer, more) > LEAST_FURTHER
+            && self.further(fewer, more) > LEAST_FURTHER
             && self.shows(&fewer.fitted.losses, &more.fitted.losses)
     }
 
@@ -430,12 +459,6 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 }
 
-/// Share of what a hypothesis leaves that another one explains.
-fn further(fewer: &Judged, more: &Judged) -> f64 {
-    let [left, after] = [fewer, more].map(|judged| total(&beyond_noise(&judged.fitted.losses)));
-    1.0 - after / left.max(f64::MIN_POSITIVE)
-}
-
 fn same_effects(a: &Judged, b: &Judged) -> bool {
     a.fitted.hypothesis.names() == b.fitted.hypothesis.names()
 }
@@ -445,16 +468,16 @@ fn possible(level: &[Judged]) -> Option<&Judged> {
     level.iter().find(|judged| !judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters))
 }
 
-/// The hypotheses that are carried on: the best, and for each signal the one that leaves least of it, since of two effects
-/// each may be alone in its signal.
-fn bases(level: &[Judged]) -> Vec<&Judged> {
+/// Ranks of the hypotheses that are carried on: the best, and for each signal the one that leaves least of it, since of two
+/// effects each may be alone in its signal.
+fn carried_on(level: &[Judged]) -> Vec<usize> {
     let left: Vec<BTreeMap<Signal, f64>> = level.iter().map(|judged| beyond_noise(&judged.fitted.losses)).collect();
     let signals = left.first().into_iter().flat_map(|left| left.keys());
     let best_for = |signal: &Signal| (0..level.len()).min_by(|a, b| left[*a][signal].total_cmp(&left[*b][signal]));
     let mut chosen: Vec<usize> = (0..level.len().min(BEAM)).chain(signals.filter_map(best_for)).collect();
     chosen.sort_unstable();
     chosen.dedup();
-    chosen.into_iter().map(|k| &level[k]).collect()
+    chosen
 }
 
 /// Effects that stand in the place of one in rivals that agree in all others.

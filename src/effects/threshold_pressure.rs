@@ -38,7 +38,14 @@ impl Effect for ThresholdPressure {
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
         of_load: false,
-        forms: &[&[("threshold_pressure.lost", &[0.4e5, 1e5]), ("threshold_pressure.fade", &[0.6e5, 1.2e5])]],
+        forms: &[
+            &[("threshold_pressure.lost", &[0.4e5, 1e5]), ("threshold_pressure.fade", &[0.6e5, 1.2e5])],
+            &[
+                ("threshold_pressure.lost", &[0.3e5]),
+                ("threshold_pressure.fade", &[0.8e5, 1.3e5]),
+                ("threshold_pressure.exponent", &[4.0]),
+            ],
+        ],
         refinements: &[
             ("threshold_pressure.exponent", &[1.5, 2.5]),
             ("threshold_pressure.decrease_with_contraction", &[0.2]),

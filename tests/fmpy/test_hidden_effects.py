@@ -22,6 +22,25 @@ def test_fresh_hidden_effects_are_named_as_often_as_claimed(sinew, tmp_path, not
     assert done.returncode == 0, f"{done.stderr}\n{done.stdout}"
 
 
+# Alone, another effect looks better than either of the first pair, and the ceiling of the second is another one.
+HARD_PAIRS = ["end_effects+contraction_sensor_delay", "valve_gain+supply_saturation"]
+
+
+def test_pairs_of_which_neither_leads_alone_are_named(sinew, tmp_path, note):
+    effects = ",".join(f"{pair}:4" for pair in HARD_PAIRS)
+    run(sys.executable, HIDDEN_EFFECTS / "generate.py", "--seed", 424242, "--effects", effects, "--out", tmp_path)
+    named = {pair: 0 for pair in HARD_PAIRS}
+    for truth in sorted((tmp_path / "truths").glob("*.json")):
+        recordings = sorted((tmp_path / "cases" / truth.stem).glob("*.csv"))
+        run(sinew, "diagnose", *recordings, "--out", tmp_path / "found")
+        causes = json.loads((tmp_path / "found" / "diagnosis.json").read_text())["causes"]
+        hidden = json.loads(truth.read_text())["effect"]
+        found = {cause["effect"] for cause in causes}
+        named[hidden] += found == set(hidden.split("+"))
+    note(f"Pairs named of four each: {named}")
+    assert all(count >= 2 for count in named.values()), named
+
+
 @pytest.fixture(scope="module")
 def same_forms(sinew, tmp_path_factory):
     """Truths of recordings of every effect in the tool's own equations, by name of the case, and their folder."""
