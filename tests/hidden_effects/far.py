@@ -700,6 +700,7 @@ SINCE_HELD = [
     DampingOfPressure,
     FallingCeiling,
     KneedGain,
+    LogisticThreshold,
     PorousLeak,
     RingingPilot,
     SettlingForce,
@@ -708,4 +709,5 @@ SINCE_HELD = [
     SettlingZero,
     Throttle,
     TwoMorePoles,
+    UnevenCreep,
 ]
