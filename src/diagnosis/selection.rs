@@ -454,7 +454,7 @@ impl<'a, 'b> Search<'a, 'b> {
             [&self.baseline, &best.fitted, &other.fitted].map(|fitted| beyond_noise(&fitted.losses));
         before.into_iter().all(|(signal, before)| {
             let alike = ALSO_BY_FORM * of_best[&signal];
-            of_other[&signal] <= NEGLIGIBLE.max(alike.min(LEFT_BY_FORM * before))
+            of_other[&signal] <= NEGLIGIBLE.max(alike.min(left_by_form(before)))
         })
     }
 }

@@ -22,7 +22,7 @@ def test_fresh_hidden_effects_are_named_as_often_as_claimed(sinew, tmp_path, not
     assert done.returncode == 0, f"{done.stderr}\n{done.stdout}"
 
 
-# Alone, another effect looks better than either of the first pair, and the ceiling of the second is another one.
+# Alone, another effect may look better than either of the first pair, and the ceiling of the second is another one.
 HARD_PAIRS = ["end_effects+contraction_sensor_delay", "valve_gain+supply_saturation"]
 
 
@@ -38,7 +38,7 @@ def test_pairs_of_which_neither_leads_alone_are_named(sinew, tmp_path, note):
         found = {cause["effect"] for cause in causes}
         named[hidden] += found == set(hidden.split("+"))
     note(f"Pairs named of four each: {named}")
-    assert all(count >= 2 for count in named.values()), named
+    assert all(count >= 3 for count in named.values()), named
 
 
 @pytest.fixture(scope="module")

@@ -64,8 +64,8 @@ class Creep(Plant):
         return super().static_force(pressure, x - own[0] - own[1], own)
 
 
-class UnevenCreep(Creep):
-    """The first element takes twice as long to come back as to give way."""
+class UnevenCreep(Plant):
+    """One element; it takes twice as long to come back as to give way."""
 
     own_scales = (0.1,)
 
@@ -79,7 +79,7 @@ class UnevenCreep(Creep):
         return [(aim - drift) / (1.5 if grows or drift == 0 else 3.0)]
 
     def static_force(self, pressure, x, own):
-        return Plant.static_force(self, pressure, x - own[0], own)
+        return super().static_force(pressure, x - own[0], own)
 
 
 class PressureCreep(Plant):

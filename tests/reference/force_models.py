@@ -10,7 +10,7 @@ step: F = -p dV/dL + dE/dL. The product has the derivatives worked out by hand.
 
 import argparse
 import csv
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
