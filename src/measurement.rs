@@ -256,6 +256,33 @@ impl Recording {
         }
     }
 
+    /// The recording with an instant more in the middle between any two samples, where each signal is on the cubic through the
+    /// two samples before and after, its gaps bridged.
+    pub fn doubled(&self) -> Self {
+        let doubled = |values: &[f64]| -> Vec<f64> {
+            let middle = |k: usize| self.halfway(values, k);
+            (0..values.len())
+                .flat_map(|k| [Some(values[k]), (k + 1 < values.len()).then(|| middle(k))])
+                .flatten()
+                .collect()
+        };
+        let signals = self.signals.keys().filter_map(|signal| Some((*signal, doubled(&self.bridged(*signal)?))));
+        Self { time: doubled(&self.time), lines: Vec::new(), signals: signals.collect(), ..self.clone() }
+    }
+
+    /// Value of the cubic through four neighbours in the middle between the second, `sample`, and the third; of the straight
+    /// line at the ends.
+    fn halfway(&self, values: &[f64], sample: usize) -> f64 {
+        let around = if sample > 0 && sample + 2 < values.len() { sample - 1..sample + 3 } else { sample..sample + 2 };
+        let time = &self.time[around.clone()];
+        let now = 0.5 * (self.time[sample] + self.time[sample + 1]);
+        let share = |k: usize| {
+            let others = time.iter().enumerate().filter(|(other, _)| *other != k);
+            others.map(|(_, other)| (now - other) / (time[k] - other)).product::<f64>()
+        };
+        values[around].iter().enumerate().map(|(k, value)| share(k) * value).sum()
+    }
+
     /// File name for people, with its folder only where another recording has the same.
     pub fn name(&self) -> String {
         self.name.clone()
@@ -403,6 +430,22 @@ mod tests {
     }
 
     const HEADER: &str = "time [ms],command [mV],gauge_pressure [bar],contraction [mm],load_mass [kg],remark";
+
+    #[test]
+    fn doubling_follows_a_cubic() {
+        let cubic = |t: f64| 1.0 + t * (0.2 + t * (-0.03 + t * 0.004));
+        let time = |k: usize| k as f64 + 0.2 * (k % 3) as f64;
+        let text = rows("time [s],command [V],contraction [mm]", |k| {
+            format!("{},{:.12},{}", time(k), cubic(time(k)), if k == 5 { String::new() } else { "7".to_owned() })
+        });
+        let doubled = parse(&text).unwrap().doubled();
+        assert_eq!(doubled.time.len(), 23);
+        assert!(doubled.get(Contraction).unwrap().iter().all(|x| (x - 7e-3).abs() < 1e-15));
+        let command = doubled.get(Command).unwrap();
+        let off = command.iter().zip(&doubled.time).map(|(u, t)| (u - cubic(*t)).abs());
+        assert!(off.skip(2).take(19).all(|off| off < 1e-10), "{command:?}");
+        assert_eq!(command[1], 0.5 * (command[0] + command[2]));
+    }
 
     #[test]
     fn units_become_si_and_gaps_are_missing() {

@@ -181,24 +181,41 @@ fn moving_mass(parameters: &Parameters) -> f64 {
 /// Point of a muscle at rest, its valve asking for the pressure that is there.
 fn at_rest(gauge_pressure: f64, contraction: f64) -> Point {
     let (commanded_pressure, target_pressure) = (gauge_pressure, gauge_pressure);
-    Point { commanded_pressure, target_pressure, gauge_pressure, contraction, contraction_velocity: 0.0 }
+    let (contraction_velocity, pressure_pull) = (0.0, 0.0);
+    Point { commanded_pressure, target_pressure, gauge_pressure, contraction, contraction_velocity, pressure_pull }
+}
+
+/// The point as the states of effects see it.
+#[inline]
+fn with_pull(parameters: &Parameters, at: &Point) -> Point {
+    let pressure_pull = parameters.force_models.pressure_force(&parameters.muscle, at.gauge_pressure, at.contraction);
+    Point { pressure_pull, ..*at }
+}
+
+/// States of the effects at the start.
+fn effects_at_start(parameters: &Parameters, at: &Point) -> [f64; Effects::STATES] {
+    parameters.effects.start(&with_pull(parameters, at))
 }
 
 /// Gauge pressure in Pa at which the valve comes to rest under a command in V, with a contraction in m.
 ///
-/// A valve that rings comes to rest where one of first order does.
+/// A valve that rings comes to rest where one of first order does; one that opens no port near its target, where its parameter
+/// says.
 pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) -> f64 {
     let mut still = *parameters;
     still.effects.valve_resonance = Default::default();
     still.effects.valve_lag.second_time_constant = 0.0;
     still.effects.valve_lag.third_time_constant = 0.0;
-    let own = still.effects.start(&at_rest(0.0, contraction));
+    let off_target = still.effects.valve_dead_band.start * still.effects.valve_dead_band.pressure_overlap;
+    still.effects.valve_dead_band.pressure_overlap = 0.0;
+    let own = effects_at_start(&still, &at_rest(0.0, contraction));
     let rate = |pressure: f64| {
         let at = with_target(&still, command, at_rest(pressure, contraction), &own);
         pressure_rate(&still, &at, &own)
     };
     let highest = 1e5 + commanded_pressure(&still, command, &at_rest(0.0, contraction), &own);
-    if rate(0.0) <= 0.0 { 0.0 } else { bisect(rate, 0.0, highest) }
+    let target = if rate(0.0) <= 0.0 { 0.0 } else { bisect(rate, 0.0, highest) };
+    (target + off_target).max(0.0)
 }
 
 /// Gauge pressure in Pa at which a weight in N hangs still at a contraction in m; see [`ForceModels::holding_pressure`].
@@ -216,7 +233,7 @@ pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
     }
     let lack = |gauge_pressure: f64| {
         let at = at_rest(gauge_pressure, contraction);
-        weight - muscle_force(parameters, &at, &parameters.effects.start(&at))
+        weight - muscle_force(parameters, &at, &effects_at_start(parameters, &at))
     };
     let highest = 2.0 * nominal + 5e5;
     if lack(0.0) <= 0.0 || lack(highest) > 0.0 { nominal } else { bisect(lack, 0.0, highest) }
@@ -230,7 +247,7 @@ pub fn equilibrium(parameters: &Parameters, gauge_pressure: f64, weight: f64) ->
     let muscle = &parameters.muscle;
     let surplus = |contraction: f64| {
         let at = at_rest(gauge_pressure, contraction);
-        muscle_force(parameters, &at, &parameters.effects.start(&at)) - weight
+        muscle_force(parameters, &at, &effects_at_start(parameters, &at)) - weight
     };
     let samples = 300;
     let at = |k: i32| muscle.rest_length * (-0.2 + 0.7 * f64::from(k) / f64::from(samples));
@@ -283,7 +300,7 @@ impl System for PneumaticMuscle {
         let contraction = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
         let mut state = [0.0; HANGING_STATES];
         state[..2].copy_from_slice(&[gauge_pressure, contraction]);
-        state[3..].copy_from_slice(&parameters.effects.start(&at_rest(gauge_pressure, contraction)));
+        state[3..].copy_from_slice(&effects_at_start(parameters, &at_rest(gauge_pressure, contraction)));
         Ok(Extended(state))
     }
 
@@ -295,7 +312,7 @@ impl System for PneumaticMuscle {
         rates.0[0] = pressure_rate(parameters, &at, own);
         rates.0[1] = at.contraction_velocity;
         rates.0[2] = (force - inputs.external_force) / moving_mass(parameters) - GRAVITY;
-        parameters.effects.rates(&at, own, &mut rates.0[3..]);
+        parameters.effects.rates(&with_pull(parameters, &at), own, &mut rates.0[3..]);
     }
 
     #[inline]
@@ -474,7 +491,7 @@ impl System for PneumaticActuator {
     fn initial_state(parameters: &Parameters, inputs: &ActuatorInputs) -> Result<Self::State> {
         let gauge_pressure = parameters.initial.gauge_pressure;
         let mut state = [gauge_pressure; DRIVEN_STATES];
-        state[1..].copy_from_slice(&parameters.effects.start(&at_rest(gauge_pressure, inputs.contraction)));
+        state[1..].copy_from_slice(&effects_at_start(parameters, &at_rest(gauge_pressure, inputs.contraction)));
         Ok(Extended(state))
     }
 
@@ -483,7 +500,7 @@ impl System for PneumaticActuator {
         let (at, own) = driven_point(inputs, state);
         let at = with_target(parameters, inputs.command, at, own);
         rates.0[0] = pressure_rate(parameters, &at, own);
-        parameters.effects.rates(&at, own, &mut rates.0[1..]);
+        parameters.effects.rates(&with_pull(parameters, &at), own, &mut rates.0[1..]);
     }
 
     #[inline]
@@ -579,12 +596,12 @@ impl System for MuscleAlone {
     const SCALE: Self::State = Extended(Effects::scales(&[]));
 
     fn initial_state(parameters: &Parameters, inputs: &MeasuredInputs) -> Result<Self::State> {
-        Ok(Extended(parameters.effects.start(&measured_point(inputs))))
+        Ok(Extended(effects_at_start(parameters, &measured_point(inputs))))
     }
 
     #[inline]
     fn rates(parameters: &Parameters, inputs: &MeasuredInputs, state: &Self::State, rates: &mut Self::State) {
-        parameters.effects.rates(&measured_point(inputs), &state.0, &mut rates.0);
+        parameters.effects.rates(&with_pull(parameters, &measured_point(inputs)), &state.0, &mut rates.0);
     }
 
     fn outputs(

@@ -5,7 +5,7 @@ use crate::effects::{Description, Freed};
 use crate::least_squares::{self, Effort, Ended, Free, derivatives, linear_decrease, normal_matrix};
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Corrections that every fit may make, in units of the declared tolerance of the nominal value: a muscle and its valve
@@ -78,6 +78,19 @@ impl Part {
         };
         form.iter().chain(refinements.iter().filter(|(name, _)| form.iter().all(|(known, _)| known != name)))
     }
+
+    /// How many starts its form has.
+    fn starts(self) -> usize {
+        self.freed().map(|(_, starts)| starts.len()).max().unwrap_or(0)
+    }
+}
+
+/// A model with an effect at one of the starts of its form.
+fn at_start(model: &Parameters, part: Part, choice: usize) -> Parameters {
+    part.freed().fold(*model, |model, (name, values)| {
+        let value = values.get(choice).or(values.last()).copied().unwrap_or_default();
+        with_values(&model, &[declared(&model, name).0], &[value])
+    })
 }
 
 /// The nominal model with its corrections and some effects at work.
@@ -327,8 +340,7 @@ impl<'a> Bench<'a> {
     pub fn starts(&self, base: &Fitted, effect: &'static Description) -> Vec<Start> {
         let forms = (0..effect.forms.len()).flat_map(|form| {
             let part = Part { effect, form, refined: Refined::Not };
-            let most = part.freed().map(|(_, starts)| starts.len()).max().unwrap_or(0);
-            (0..most).map(move |choice| (part, choice))
+            (0..part.starts()).map(move |choice| (part, choice))
         });
         let mut starts: Vec<Start> = forms.filter_map(|(part, choice)| self.start(base, part, choice)).collect();
         starts.sort_by(|a, b| b.promise.total_cmp(&a.promise));
@@ -337,11 +349,7 @@ impl<'a> Bench<'a> {
 
     /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.
     pub fn start(&self, base: &Fitted, part: Part, choice: usize) -> Option<Start> {
-        let mut parameters = base.parameters;
-        for (name, values) in part.freed() {
-            let value = values.get(choice).or(values.last()).copied().unwrap_or_default();
-            parameters = with_values(&parameters, &[declared(&parameters, name).0], &[value]);
-        }
+        let parameters = at_start(&base.parameters, part, choice);
         let changed = self.data.residuals(&parameters)?;
         let change = changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect::<Vec<_>>();
         let change = weighted(&change, &self.weights);
@@ -351,6 +359,17 @@ impl<'a> Bench<'a> {
         }
         let promise = self.promise(base, change);
         Some(Start { promise, part, choice, parameters })
+    }
+
+    /// A model with an effect of its own exchanged for another form of it, at the start that leaves least; `None` where none
+    /// can be simulated.
+    pub fn best_start(&self, model: &Parameters, part: Part) -> Option<Parameters> {
+        let without = neutralised(model, part.effect);
+        let starts = (0..part.starts()).into_par_iter().filter_map(|choice| {
+            let model = at_start(&without, part, choice);
+            Some((cost(&self.data.residuals(&model)?, &self.weights), choice, model))
+        });
+        starts.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(.., model)| model)
     }
 
     /// Share of the squares that goes away when a change is scaled, up to five times in either direction, and the
@@ -379,23 +398,48 @@ impl<'a> Bench<'a> {
     /// The parameters of a fit with their 95 % intervals: those of the effects, then the corrections.
     ///
     /// The scatter of the estimate comes from how much blocks of a few seconds pull it apart, noise or not (sandwich with
-    /// clusters: H. White 1982, doi 10.2307/1912526; K.-Y. Liang and S. Zeger 1986, doi 10.1093/biomet/73.1.13).
+    /// clusters: H. White 1982, doi 10.2307/1912526; K.-Y. Liang and S. Zeger 1986, doi 10.1093/biomet/73.1.13), and from how
+    /// far it goes if the inputs are no straight lines between their samples.
     pub fn intervals(&self, fitted: &Fitted, scope: Scope) -> (Vec<FittedParameter>, Vec<FittedParameter>) {
         let (variables, free) = self.everything_free(&fitted.hypothesis, &fitted.parameters);
         let at: Vec<f64> = free.iter().map(|f| f.start).collect();
-        let residuals = |values: &[f64]| self.data.residuals(&with_values(self.nominal, &variables, values));
-        let columns = derivatives(&residuals, &free, &at, &fitted.residuals);
-        let (bread, filling) = self.normal_matrices(&columns, &free, fitted, scope);
-        let deviations = bread.try_inverse().map(|inverse| &inverse * filling * &inverse);
+        let deviations = self.deviations(&variables, &free, &at, fitted, scope);
         let parameters = variables.iter().enumerate().map(|(k, variable)| {
-            let deviation = deviations.as_ref().map_or(f64::INFINITY, |c| c[(k, k)].max(0.0).sqrt() * free[k].typical);
-            let (value, half) = (at[k], 1.96 * deviation);
+            let (value, half) = (at[k], 1.96 * deviations.as_ref().map_or(f64::INFINITY, |d| d[k]));
             let (low, high) = ((value - half).max(free[k].lower), (value + half).min(free[k].upper));
             FittedParameter { name: variable.name, value, low, high, unit: variable.unit.symbol }
         });
         let mut found: Vec<_> = parameters.collect();
         let corrections = found.split_off(fitted.hypothesis.size());
         (found, corrections)
+    }
+
+    /// Standard deviation of each estimate; `None` where the data do not tell them.
+    fn deviations(
+        &self,
+        variables: &[&'static Variable],
+        free: &[Free],
+        at: &[f64],
+        fitted: &Fitted,
+        scope: Scope,
+    ) -> Option<Vec<f64>> {
+        let residuals = |values: &[f64]| self.data.residuals(&with_values(self.nominal, variables, values));
+        let weights = self.data.weights(scope);
+        let scaled = |(column, free): (Vec<f64>, &Free)| -> Vec<f64> {
+            column.iter().zip(&weights).map(|(slope, weight)| slope * weight * free.typical).collect()
+        };
+        let columns = derivatives(&residuals, free, at, &fitted.residuals);
+        let columns: Vec<Vec<f64>> = columns.into_iter().zip(free).map(scaled).collect();
+        // The small constant keeps a parameter without influence from spoiling the others.
+        let priors = free.iter().map(|free| 1e-9 + free.prior.map_or(0.0, |(_, of)| (free.typical / of).powi(2)));
+        let priors = DMatrix::from_diagonal(&DVector::from_iterator(free.len(), priors));
+        let inverse = (normal_matrix(&columns) + &priors).try_inverse()?;
+        let scatter = &inverse * (self.gradients(&columns, &weighted(&fitted.residuals, &weights)) + priors) * &inverse;
+        let sampling = weighted(&self.data.sampling_error(&fitted.parameters)?, &weights);
+        let pull = columns.iter().map(|column| column.iter().zip(&sampling).map(|(slope, error)| slope * error).sum());
+        let shift = inverse * DVector::from_iterator(free.len(), pull);
+        let deviation = |k: usize| (scatter[(k, k)].max(0.0) + shift[k].powi(2)).sqrt() * free[k].typical;
+        Some((0..free.len()).map(deviation).collect())
     }
 
     /// Sum over blocks of the squared gradients that each of them contributes, enlarged for how few they are.
@@ -411,30 +455,6 @@ impl<'a> Bench<'a> {
         let seen = gradients.column_iter().filter(|gradient| gradient.iter().any(|g| *g != 0.0)).count() as f64;
         let free = (seen - columns.len() as f64).max(1.0);
         &gradients * gradients.transpose() * (seen / free)
-    }
-
-    /// Information of the fit, and variance of its gradient.
-    fn normal_matrices(
-        &self,
-        columns: &[Vec<f64>],
-        free: &[Free],
-        fitted: &Fitted,
-        scope: Scope,
-    ) -> (DMatrix<f64>, DMatrix<f64>) {
-        let weights = self.data.weights(scope);
-        let scaled = |(column, free): (&Vec<f64>, &Free)| -> Vec<f64> {
-            column.iter().zip(&weights).map(|(slope, weight)| slope * weight * free.typical).collect()
-        };
-        let columns: Vec<Vec<f64>> = columns.iter().zip(free).map(scaled).collect();
-        let mut bread = normal_matrix(&columns);
-        let mut filling = self.gradients(&columns, &weighted(&fitted.residuals, &weights));
-        for (k, free) in free.iter().enumerate() {
-            let prior = free.prior.map_or(0.0, |(_, deviation)| (free.typical / deviation).powi(2));
-            // The small constant keeps a parameter without influence from spoiling the others.
-            bread[(k, k)] += prior + 1e-9;
-            filling[(k, k)] += prior + 1e-9;
-        }
-        (bread, filling)
     }
 }
 

@@ -18,7 +18,7 @@ const FEWEST_SAMPLES: usize = 50;
 const LONGEST_CORRELATION: f64 = 3.0;
 /// Structural error of a nominal muscle beyond its coefficients, as a share of the declared tolerance and of the span of
 /// the signal: a polynomial is never quite the muscle.
-const STRUCTURE_SHARE: f64 = 0.03;
+const STRUCTURE_SHARE: f64 = 0.02;
 /// Length of a block in s: errors of different blocks count as independent.
 const BLOCK: f64 = 2.0;
 /// No sensor is better than this share of what it shows: data without any noise are simulated.
@@ -177,12 +177,25 @@ impl<'a> Data<'a> {
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
     /// simulated.
     pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+        self.residuals_on(self.recordings, 1, parameters)
+    }
+
+    /// By how much the residuals change where inputs go along cubics between their samples instead of along straight lines:
+    /// how they truly go nobody knows. `None` where the model cannot be simulated.
+    pub fn sampling_error(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+        let doubled: Vec<Recording> = self.recordings.iter().map(Recording::doubled).collect();
+        let (lines, cubics) = (self.residuals(parameters)?, self.residuals_on(&doubled, 2, parameters)?);
+        Some(cubics.iter().zip(&lines).map(|(cubic, line)| cubic - line).collect())
+    }
+
+    /// Residuals of simulations on recordings whose `every`-th samples are those of this data.
+    fn residuals_on(&self, recordings: &[Recording], every: usize, parameters: &Parameters) -> Option<Vec<f64>> {
         let replayed = |recording| replay_within(parameters, recording, self.integration).ok();
-        let replays: Vec<_> = self.recordings.par_iter().map(replayed).collect::<Option<_>>()?;
+        let replays: Vec<_> = recordings.par_iter().map(replayed).collect::<Option<_>>()?;
         let mut all = Vec::with_capacity(self.segments.last().map_or(0, |segment| segment.range.end));
         for segment in &self.segments {
             let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);
-            all.extend(segment.samples.iter().map(|&k| measured[k] - simulated[k]));
+            all.extend(segment.samples.iter().map(|&k| measured[k] - simulated[every * k]));
         }
         all.iter().all(|residual| residual.is_finite()).then_some(all)
     }

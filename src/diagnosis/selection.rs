@@ -15,6 +15,8 @@ const RIVAL: f64 = 3.0;
 /// Share of the error beyond noise that the named causes together must explain: of all samples, and of those that the fit did
 /// not see. Measured seals leave 3.5 % in the form of friction that we have, a measured leak 5 to 10 % of what is unseen.
 const LEAST_EXPLAINED: (f64, f64) = (0.96, 0.9);
+/// The same where all causes are scales and zeros: these have no form that could differ from ours.
+const LEAST_EXPLAINED_EXACTLY: (f64, f64) = (0.995, 0.95);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
 const LEAST_FURTHER: f64 = 0.8;
 /// The same before the hypothesis is refined: fits of two effects that came to be named began at 0.87 and more.
@@ -30,7 +32,7 @@ const ALSO_BY_FORM: f64 = 3.0;
 /// Share of the error that a hypothesis must explain before its refinement, to become a rival of one that leaves nothing.
 const MAY_RIVAL: f64 = 0.8;
 /// How many times the structural error of a sound model an error must be to be called unexplained.
-const UNEXPLAINED: f64 = 6.5;
+const UNEXPLAINED: f64 = 9.75;
 /// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
 const BEAM: usize = 3;
 /// Most effects that are looked for at once.
@@ -212,13 +214,12 @@ impl<'a, 'b> Search<'a, 'b> {
     /// fitted to the end: what a fit left undone would else be credited to the next effect. Where the very best leaves nothing
     /// to look for, only those that may rival it are, with all of theirs.
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
-        let ranks = carried_on(&judged);
+        let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
-        let Some(best) = others.next().map(|(_, best)| self.finished(self.refined(best))) else { return Vec::new() };
+        let leading = others.next().map(|(_, best)| self.finished(self.refined(self.in_other_forms(best))));
+        let Some(best) = leading else { return Vec::new() };
         let is_enough = self.is_enough(&best.fitted.losses);
-        let is_close = |(rank, other): &(usize, Judged)| {
-            if is_enough { *rank < BEAM && other.explained > MAY_RIVAL } else { ranks.contains(rank) }
-        };
+        let is_close = |(rank, _): &(usize, Judged)| if is_enough { &rivals } else { &ranks }.contains(rank);
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
         let refined = close.into_par_iter().map(|(_, judged)| {
@@ -233,6 +234,19 @@ impl<'a, 'b> Search<'a, 'b> {
         self.bench
             .exact_fit(&judged.fitted.hypothesis, &start, Scope::All)
             .map_or(judged.clone(), |fitted| self.judge(fitted))
+    }
+
+    /// The hypothesis in the form of its last effect that is best: of the starts only the most promising were fitted.
+    fn in_other_forms(&self, judged: Judged) -> Judged {
+        let Some((last, _)) = judged.fitted.hypothesis.parts.split_last() else { return judged };
+        let others = (0..last.effect.forms.len()).filter(|form| *form != last.form).collect::<Vec<_>>().into_par_iter();
+        let fits = others.filter_map(|form| {
+            let part = Part { form, refined: Refined::Not, ..*last };
+            let start = self.bench.best_start(&judged.fitted.parameters, part)?;
+            let hypothesis = judged.fitted.hypothesis.without(last.effect.name).with(part);
+            Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
+        });
+        fits.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
@@ -390,7 +404,7 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
         let Some(best) = self.leading(&levels).map(|best| self.pruned(best.clone())) else { return refused(wrong) };
-        if best.explained < LEAST_EXPLAINED.0 {
+        if best.explained < least_explained(&best.fitted).0 {
             return refused(wrong);
         }
         let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
@@ -433,7 +447,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let (without, with) = (unseen(&baseline), unseen(trained));
         let (before, after) = (beyond_noise(&without), beyond_noise(&with));
         let explained = 1.0 - self.unsound(&after) / total(&before).max(f64::MIN_POSITIVE);
-        Some(gain(&without, &with) > 0.0 && explained > LEAST_EXPLAINED.1)
+        Some(gain(&without, &with) > 0.0 && explained > least_explained(trained).1)
     }
 
     /// Hypotheses that explain the data as well as the best: all that the odds allow, or else the one whose forms may be why it
@@ -459,6 +473,12 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 }
 
+/// Share of the error that the effects of a fit must explain: of all samples, and of those that it did not see.
+fn least_explained(fitted: &Fitted) -> (f64, f64) {
+    let exact = fitted.hypothesis.parts.iter().all(|part| part.effect.exact);
+    if exact { LEAST_EXPLAINED_EXACTLY } else { LEAST_EXPLAINED }
+}
+
 fn same_effects(a: &Judged, b: &Judged) -> bool {
     a.fitted.hypothesis.names() == b.fitted.hypothesis.names()
 }
@@ -478,6 +498,16 @@ fn carried_on(level: &[Judged]) -> Vec<usize> {
     chosen.sort_unstable();
     chosen.dedup();
     chosen
+}
+
+/// Ranks of the hypotheses that may rival one that leaves nothing: of those that explain enough the best, and those that explain
+/// the most, since in one signal a form that is not quite right spoils the odds.
+fn may_rival(level: &[Judged]) -> Vec<usize> {
+    let mut ranks: Vec<usize> = (0..level.len()).filter(|rank| level[*rank].explained > MAY_RIVAL).collect();
+    let best: Vec<usize> = ranks.iter().copied().filter(|rank| *rank < BEAM).collect();
+    ranks.sort_by(|a, b| level[*b].explained.total_cmp(&level[*a].explained));
+    ranks.truncate(BEAM);
+    best.into_iter().chain(ranks).collect()
 }
 
 /// Effects that stand in the place of one in rivals that agree in all others.

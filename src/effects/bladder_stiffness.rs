@@ -32,6 +32,7 @@ impl Effect for BladderStiffness {
         experiment: "stretch the muscle without pressure; the same motion at two constant pressures",
         reference: "thesis eqs. 4.5, 4.17",
         of_load: false,
+        exact: false,
         forms: &[&[("bladder_stiffness.relative_change", &[0.15, -0.15])]],
         refinements: &[("bladder_stiffness.change_with_contraction", &[0.1])],
     };

@@ -30,6 +30,7 @@ impl Effect for ContractionSensorDelay {
         experiment: "fast motion with force recorded, or a second position sensor",
         reference: "definition",
         of_load: false,
+        exact: false,
         forms: &[&[("contraction_sensor_delay.delay", &[0.02, 0.06])]],
         refinements: &[],
     };

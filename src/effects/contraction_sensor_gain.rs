@@ -31,7 +31,12 @@ impl Effect for ContractionSensorGain {
         experiment: "compare with a ruler at two lengths",
         reference: "definition",
         of_load: false,
-        forms: &[&[("contraction_sensor_gain.relative_error", &[0.05, -0.05])]],
+        exact: true,
+        forms: &[
+            &[("contraction_sensor_gain.relative_error", &[0.05, -0.05])],
+            // A gain alone may be what the coefficients of the muscle stand for.
+            &[("contraction_sensor_gain.bend", &[0.02]), ("contraction_sensor_gain.relative_error", &[0.0])],
+        ],
         refinements: &[("contraction_sensor_gain.bend", &[0.005])],
     };
 

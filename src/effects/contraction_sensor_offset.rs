@@ -40,6 +40,7 @@ impl Effect for ContractionSensorOffset {
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
         of_load: false,
+        exact: true,
         forms: &[
             &[("contraction_sensor_offset.offset", &[5e-3, -5e-3])],
             // Corrections of the muscle take a constant offset over, and leave how it settles.

@@ -36,6 +36,7 @@ impl Effect for EndEffects {
         experiment: "compare two rest lengths",
         reference: "Tondu and Lopez 2000; Kothera et al. 2009",
         of_load: false,
+        exact: false,
         forms: &[&[("end_effects.excess", &[0.1])]],
         refinements: &[("end_effects.low_pressure_excess", &[0.05])],
     };

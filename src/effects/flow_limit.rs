@@ -68,6 +68,7 @@ impl Effect for FlowLimit {
         experiment: "steps of several sizes, up and down",
         reference: "ISO 6358",
         of_load: false,
+        exact: false,
         forms: &[
             &[("flow_limit.filling", &[0.5e5, 1.2e5, 3e5]), ("flow_limit.emptying", &[0.5e5, 1.2e5, 3e5])],
             &[

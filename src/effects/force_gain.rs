@@ -32,6 +32,7 @@ impl Effect for ForceGain {
         experiment: "two known masses, static and dynamic",
         reference: "definition",
         of_load: false,
+        exact: false,
         forms: &[&[("force_gain.relative_error", &[0.08, -0.08])]],
         refinements: &[("force_gain.bend", &[0.005])],
     };

@@ -32,7 +32,12 @@ impl Effect for ForceSensorGain {
         experiment: "hang two known masses on the sensor",
         reference: "definition",
         of_load: false,
-        forms: &[&[("force_sensor_gain.relative_error", &[0.05, -0.05])]],
+        exact: true,
+        forms: &[
+            &[("force_sensor_gain.relative_error", &[0.05, -0.05])],
+            // A gain alone may be what the coefficients of the muscle stand for.
+            &[("force_sensor_gain.bend", &[0.02]), ("force_sensor_gain.relative_error", &[0.0])],
+        ],
         refinements: &[("force_sensor_gain.bend", &[0.005])],
     };
 

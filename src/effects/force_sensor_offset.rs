@@ -40,6 +40,7 @@ impl Effect for ForceSensorOffset {
         experiment: "read the sensor with nothing attached",
         reference: "definition",
         of_load: false,
+        exact: true,
         forms: &[&[("force_sensor_offset.offset", &[20.0, -20.0])]],
         refinements: &[("force_sensor_offset.settling_share", &[0.3]), ("force_sensor_offset.settling_time", &[5.0])],
     };

@@ -78,6 +78,7 @@ impl Effect for FrictionHysteresis {
         experiment: "triangles of shrinking amplitude at three pressures",
         reference: "Dahl 1968; Wen 1976; thesis eq. 4.20",
         of_load: false,
+        exact: false,
         forms: &[&[
             ("friction_hysteresis.half_width", &[10.0, 25.0]),
             ("friction_hysteresis.half_width_per_pressure", &[3e-5, 1e-4]),

@@ -67,6 +67,7 @@ impl Effect for Leakage {
         experiment: "shut the valve and watch the pressure for a minute",
         reference: "ISO 6358",
         of_load: false,
+        exact: false,
         forms: &[&[("leakage.rate", &[0.3, 1.0])], &[("leakage.rate", &[0.3, 1.0]), ("leakage.choked_share", &[0.5])]],
         refinements: &[
             ("leakage.choked_share", &[0.5]),

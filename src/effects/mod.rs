@@ -21,6 +21,8 @@ pub struct Point {
     pub contraction: f64,
     /// Rate of the contraction, m/s.
     pub contraction_velocity: f64,
+    /// Pull of the pressure on the virtual area without effects, N; known only to the hooks of the states, `start` and `rates`.
+    pub pressure_pull: f64,
 }
 
 impl Point {
@@ -85,6 +87,8 @@ pub struct Description {
     pub reference: &'static str,
     /// Whether it concerns the load, and so means nothing to a muscle that is moved from outside.
     pub of_load: bool,
+    /// Whether it is a scale or a zero, whose equation is its definition; a law of nature in an equation is always simpler than it.
+    pub exact: bool,
     /// Common forms of the effect, each the parameters that a fit frees, its size first; the best form stands for the cause.
     pub forms: &'static [&'static [Freed]],
     /// Parameters that are freed as well once the effect leads, and stay free only where the data pay for them.

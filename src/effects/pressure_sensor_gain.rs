@@ -32,7 +32,12 @@ impl Effect for PressureSensorGain {
         experiment: "compare with a second gauge at two pressures",
         reference: "definition",
         of_load: false,
-        forms: &[&[("pressure_sensor_gain.relative_error", &[0.05, -0.05])]],
+        exact: true,
+        forms: &[
+            &[("pressure_sensor_gain.relative_error", &[0.05, -0.05])],
+            // A gain alone may be what the coefficients of the muscle stand for.
+            &[("pressure_sensor_gain.bend", &[0.02]), ("pressure_sensor_gain.relative_error", &[0.0])],
+        ],
         refinements: &[("pressure_sensor_gain.bend", &[0.005])],
     };
 

@@ -41,6 +41,7 @@ impl Effect for PressureSensorOffset {
         experiment: "read the sensor with the muscle open to the air",
         reference: "definition",
         of_load: false,
+        exact: true,
         forms: &[&[("pressure_sensor_offset.offset", &[1e4, -1e4])]],
         refinements: &[
             ("pressure_sensor_offset.settling_share", &[0.3]),

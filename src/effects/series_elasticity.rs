@@ -48,6 +48,7 @@ impl Effect for SeriesElasticity {
         experiment: "lock the load and vary the pressure",
         reference: "Hooke",
         of_load: false,
+        exact: false,
         forms: &[
             &[("series_elasticity.load_compliance", &[5e-6])],
             &[("series_elasticity.compliance", &[-5e-6, 5e-6])],

@@ -49,6 +49,7 @@ impl Effect for SupplySaturation {
         experiment: "record the supply pressure; raise it",
         reference: "definition",
         of_load: false,
+        exact: false,
         forms: &[&[("supply_saturation.gauge_pressure", CEILINGS)]],
         refinements: &[
             ("supply_saturation.rounding", &[3e3]),

@@ -35,6 +35,7 @@ impl Effect for TemperatureDrift {
         experiment: "the same cycle for several minutes, from cold",
         reference: "definition",
         of_load: false,
+        exact: false,
         forms: &[&[
             ("temperature_drift.area_change", &[0.05, -0.05]),
             ("temperature_drift.time_constant", &[10.0, 25.0]),

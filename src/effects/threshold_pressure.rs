@@ -38,6 +38,7 @@ impl Effect for ThresholdPressure {
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
         of_load: false,
+        exact: false,
         forms: &[
             &[("threshold_pressure.lost", &[0.4e5, 1e5]), ("threshold_pressure.fade", &[0.6e5, 1.2e5])],
             &[

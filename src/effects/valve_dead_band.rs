@@ -7,7 +7,9 @@ crate::variables::variables! {
     /// # Model
     /// Play: the pilot w moves only where the command u pushes it, |u − w| ≤ `play`. Stiction: it rests until
     /// |u − w| reaches `stiction`, and jumps to u then. Overlap: the spool opens no port while the pressure is off its
-    /// target by less than `pressure_overlap`. All three may be there, in this order.
+    /// target by less than `pressure_overlap` h; beyond, the valve goes for the share min(|e|, s (|e| − h)) of that error e,
+    /// `overlap_steepness` s: for one it misses the target by h, for more the port opens the more abruptly. All three may be
+    /// there, in this order.
     ///
     /// # In the data
     /// The pressure residual in slow stairs with the muscle locked: a constant that changes sign with the direction
@@ -26,7 +28,9 @@ crate::variables::variables! {
         stiction: f64 = 0.0, VOLT, (0.0..=2.0);
         /// Deviation from the target pressure below which no port opens
         pressure_overlap: f64 = 0.0, PASCAL, (0.0..=2e5);
-        /// Where in its play the pilot starts: -1 lower end, 1 upper end
+        /// How abruptly a port opens beyond the overlap
+        overlap_steepness: f64 = 1.0, ONE, (1.0..=30.0);
+        /// Where in its play the pilot starts, or in its overlap the pressure: -1 lower end, 1 upper end
         start: f64 = 0.0, ONE, (-1.0..=1.0);
     }
 }
@@ -50,10 +54,12 @@ impl Effect for ValveDeadBand {
         experiment: "slow stairs and ramps of the command, up and down, with the muscle locked",
         reference: "Choudhury et al. 2005",
         of_load: false,
+        exact: false,
         forms: &[
             &[("valve_dead_band.play", &[0.03, 0.08, 0.15])],
             &[("valve_dead_band.stiction", STICTION_STARTS)],
             &[("valve_dead_band.pressure_overlap", &[5e3])],
+            &[("valve_dead_band.pressure_overlap", &[3e3, 8e3, 2e4]), ("valve_dead_band.overlap_steepness", &[10.0])],
         ],
         refinements: &[("valve_dead_band.start", &[0.3, -0.3])],
     };
@@ -70,9 +76,9 @@ impl Effect for ValveDeadBand {
         if self.pressure_overlap == 0.0 {
             return target;
         }
-        let overlap = self.pressure_overlap;
-        // Not `clamp`, which panics where a derivative tries an overlap below zero.
-        target - (target - at.gauge_pressure).max(-overlap).min(overlap)
+        let error = target - at.gauge_pressure;
+        let beyond = self.overlap_steepness * (error.abs() - self.pressure_overlap).max(0.0);
+        at.gauge_pressure + error.signum() * beyond.min(error.abs())
     }
 
     fn sentence(&self) -> String {

@@ -30,6 +30,7 @@ impl Effect for ValveDeadTime {
         experiment: "steps of several sizes, sampled fast",
         reference: "definition",
         of_load: false,
+        exact: false,
         forms: &[&[("valve_dead_time.delay", &[0.03, 0.1])]],
         refinements: &[],
     };

@@ -35,6 +35,7 @@ impl Effect for ValveGain {
         experiment: "stairs of the command with the pressure recorded by a second sensor",
         reference: "definition",
         of_load: false,
+        exact: true,
         forms: &[&[("valve_gain.relative_error", &[0.05, -0.05])]],
         refinements: &[("valve_gain.bend", &[0.003])],
     };

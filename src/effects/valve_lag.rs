@@ -47,6 +47,7 @@ impl Effect for ValveLag {
         experiment: "steps of several sizes with pressure recorded",
         reference: "thesis eq. 5.3",
         of_load: false,
+        exact: false,
         forms: &[&[("valve_lag.time_constant", &[0.05])], &[("valve_lag.second_time_constant", &[0.05])]],
         refinements: &[
             ("valve_lag.time_constant", &[0.02]),

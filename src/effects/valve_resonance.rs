@@ -43,6 +43,7 @@ impl Effect for ValveResonance {
         experiment: "steps, and sines of two amplitudes around the natural frequency",
         reference: "definition",
         of_load: false,
+        exact: false,
         forms: &[
             &[("valve_resonance.damping_ratio", &[0.3, 0.5]), ("valve_resonance.natural_frequency", &[20.0, 35.0])],
             &[

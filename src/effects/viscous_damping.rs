@@ -46,6 +46,7 @@ impl Effect for ViscousDamping {
         experiment: "the same triangle at three speeds",
         reference: "Reynolds et al. 2003; thesis eq. 3.47",
         of_load: false,
+        exact: false,
         forms: &[&[("viscous_damping.contraction", &[200.0]), ("viscous_damping.extension", &[200.0])]],
         refinements: &[
             ("viscous_damping.exponent", &[0.2, -0.2]),

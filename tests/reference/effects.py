@@ -98,6 +98,22 @@ class PressureCreep(Plant):
         return super().static_force(pressure + 0.2 * (own[0] - self.at_start), x, own)
 
 
+class PullCreep(Plant):
+    """A share of what the pressure pulled on the mean of the last seconds comes on top, less that of the start."""
+
+    own_scales = (1e3,)
+
+    def own_start(self, x):
+        self.at_start = VALVE_GAIN * STAIRS[0] * VIRTUAL_AREA_1000.area(x)
+        return [self.at_start]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(pressure * VIRTUAL_AREA_1000.area(x) - own[0]) / 2.5]
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x, own) + 0.2 * (own[0] - self.at_start)
+
+
 class Resonance(Plant):
     own_scales = (1e6,)
 
@@ -155,6 +171,14 @@ class Stiction(Plant):
                 stuck, t = u + s * (jump - t0), jump
             result.append((t, t1, stuck, 0.0))
         return result
+
+
+class Overlap(Plant):
+    """Nothing flows up to an error of 6 kPa, all that is wanted from 7.5 kPa on, in between the line from one to the other."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        error = target - pressure
+        return VALVE_BANDWIDTH * np.sign(error) * np.interp(abs(error), [0, 6e3, 7.5e3, 1e6], [0, 0, 7.5e3, 1e6])
 
 
 class FlowLimit(Plant):
@@ -220,10 +244,12 @@ CASES = [
     Case("creep", Creep(), STAIRS),
     Case("uneven_creep", UnevenCreep(), STAIRS),
     Case("pressure_creep", PressureCreep(), STAIRS),
+    Case("pull_creep", PullCreep(), STAIRS),
     Case("resonance", Resonance(), STAIRS),
     Case("dead_time", DeadTime(), RAMPS),
     Case("play", Play(), RAMPS),
     Case("stiction", Stiction(), RAMPS),
+    Case("overlap", Overlap(), STAIRS),
     Case("flow_limit", FlowLimit(), STAIRS),
     Case("leakage", Leakage(), STAIRS),
     Case("series_elasticity", SeriesElasticity(), RAMPS),
