@@ -64,7 +64,6 @@ fn effects_agree_with_scipy() {
             &[("creep.amplitude_1", 0.1), ("creep.time_1", 1.5), ("creep.amplitude_2", 0.05), ("creep.time_2", 8.0)],
         ),
         ("uneven_creep", &[("creep.amplitude_1", 0.1), ("creep.time_1", 1.5), ("creep.return_ratio", 2.0)]),
-        ("pressure_creep", &[("creep.pressure_amplitude", 0.2), ("creep.time_1", 2.5)]),
         ("pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5)]),
         ("resonance", &[("valve_resonance.natural_frequency", 25.0), ("valve_resonance.damping_ratio", 0.35)]),
         ("dead_time", &[("valve_dead_time.delay", 0.0373)]),

@@ -180,12 +180,12 @@ impl<'a> Data<'a> {
         self.residuals_on(self.recordings, 1, parameters)
     }
 
-    /// By how much the residuals change where inputs go along cubics between their samples instead of along straight lines:
-    /// how they truly go nobody knows. `None` where the model cannot be simulated.
-    pub fn sampling_error(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+    /// By how much the residuals of a model change where inputs go along cubics between their samples instead of along straight
+    /// lines: how they truly go nobody knows. `None` where the model cannot be simulated.
+    pub fn sampling_error(&self, parameters: &Parameters, residuals: &[f64]) -> Option<Vec<f64>> {
         let doubled: Vec<Recording> = self.recordings.iter().map(Recording::doubled).collect();
-        let (lines, cubics) = (self.residuals(parameters)?, self.residuals_on(&doubled, 2, parameters)?);
-        Some(cubics.iter().zip(&lines).map(|(cubic, line)| cubic - line).collect())
+        let cubics = self.residuals_on(&doubled, 2, parameters)?;
+        Some(cubics.iter().zip(residuals).map(|(cubic, line)| cubic - line).collect())
     }
 
     /// Residuals of simulations on recordings whose `every`-th samples are those of this data.

@@ -216,8 +216,7 @@ impl<'a, 'b> Search<'a, 'b> {
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
-        let leading = others.next().map(|(_, best)| self.finished(self.refined(self.in_other_forms(best))));
-        let Some(best) = leading else { return Vec::new() };
+        let Some(best) = others.next().map(|(_, best)| self.led_by(best)) else { return Vec::new() };
         let is_enough = self.is_enough(&best.fitted.losses);
         let is_close = |(rank, _): &(usize, Judged)| if is_enough { &rivals } else { &ranks }.contains(rank);
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
@@ -236,9 +235,19 @@ impl<'a, 'b> Search<'a, 'b> {
             .map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// The hypothesis in the form of its last effect that is best: of the starts only the most promising were fitted.
-    fn in_other_forms(&self, judged: Judged) -> Judged {
-        let Some((last, _)) = judged.fitted.hypothesis.parts.split_last() else { return judged };
+    /// The hypothesis that leads a level, refined in all its effects and, where that is not enough, in the best form of its last.
+    fn led_by(&self, judged: Judged) -> Judged {
+        let refined = self.finished(self.refined(judged.clone()));
+        if self.is_enough(&refined.fitted.losses) {
+            return refined;
+        }
+        let other = self.in_other_forms(&judged).map(|other| self.finished(self.refined(other)));
+        other.into_iter().chain([refined.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
+    }
+
+    /// The hypothesis in another form of its last effect, where one is better: of the starts only the most promising were fitted.
+    fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
+        let last = judged.fitted.hypothesis.parts.last()?;
         let others = (0..last.effect.forms.len()).filter(|form| *form != last.form).collect::<Vec<_>>().into_par_iter();
         let fits = others.filter_map(|form| {
             let part = Part { form, refined: Refined::Not, ..*last };
@@ -246,7 +255,7 @@ impl<'a, 'b> Search<'a, 'b> {
             let hypothesis = judged.fitted.hypothesis.without(last.effect.name).with(part);
             Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
         });
-        fits.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
+        fits.max_by(|a, b| a.score.total_cmp(&b.score)).filter(|other| other.score > judged.score)
     }
 
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay

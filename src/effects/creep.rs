@@ -1,19 +1,17 @@
 use super::{Description, Effect, Point};
 
 crate::variables::variables! {
-    /// Creep: the membrane gives way slowly, or lets the pressure through to the braid slowly, or settles into it.
+    /// Creep: the membrane gives way slowly, or settles into the braid slowly.
     ///
     /// # Model
     /// The membrane feels x − d₁ − d₂, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
     /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing
-    /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The area feels p + d_p, with
-    /// τ₁ dd_p/dt + d_p = a_p (p − p(0)), `pressure_amplitude` a_p, and pulls by d_F more, with
+    /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The pressure pulls by d_F more, with
     /// τ₁ dd_F/dt + d_F = a_F (A p − A(0) p(0)), `pull_amplitude` a_F. While a drift goes back, its time is `return_ratio` τ.
     ///
     /// # In the data
     /// Contraction drifts for seconds at constant measured pressure, unlike up and down; in a prescribed motion the force
-    /// does, with the parts of pressure and pull also where the muscle is locked; these two differ where the muscle shortens
-    /// under a load, which needs more pressure but hardly more pull. A leak drifts in the pressure; hysteresis does not
+    /// does, with the part of the pull also where the muscle is locked. A leak drifts in the pressure; hysteresis does not
     /// depend on time.
     ///
     /// # Validity
@@ -37,8 +35,6 @@ crate::variables::variables! {
         relaxed_share: f64 = 1.0, ONE, (0.0..=1.0);
         /// Share of the remaining drift that lies before the start
         settled_share: f64 = 0.0, ONE, (0.0..=1.0);
-        /// Drift of the pressure that the braid feels, per pressure
-        pressure_amplitude: f64 = 0.0, ONE, (-0.5..=1.0);
         /// Drift of the pull of the pressure, per pull
         pull_amplitude: f64 = 0.0, ONE, (-0.5..=1.0);
         /// Time in which a drift goes back, relative to that in which it grows
@@ -58,7 +54,7 @@ impl Effect for Creep {
     const DESCRIPTION: Description = Description {
         name: "creep",
         meaning: "slow visco-elastic drift of the membrane at constant pressure",
-        equation: "x <- x - d1 - d2;  tau_i d(d_i)/dt + d_i = a_i (x - x_r);  A p <- A (p + d_p) + d_F",
+        equation: "x <- x - d1 - d2;  tau_i d(d_i)/dt + d_i = a_i (x - x_r);  A p <- A p + d_F",
         signature: "drift over seconds at constant measured pressure",
         experiment: "hold for a minute after a step, up and down",
         reference: "Kelvin-Voigt; Minh et al. 2010",
@@ -66,7 +62,6 @@ impl Effect for Creep {
         exact: false,
         forms: &[
             &[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])],
-            &[("creep.pressure_amplitude", &[0.15]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.pull_amplitude", &[0.15]), ("creep.time_1", &[1.5, 10.0])],
         ],
         refinements: &[
@@ -74,36 +69,33 @@ impl Effect for Creep {
             ("creep.time_2", &[15.0, 0.5]),
             ("creep.relaxed_share", &[0.5]),
             ("creep.settled_share", &[0.5]),
-            ("creep.pressure_amplitude", &[0.05]),
+            ("creep.pull_amplitude", &[0.05]),
             ("creep.return_ratio", &[1.5]),
         ],
     };
-    /// Both drifts of the contraction, contraction, pressure and pull where nothing drifts, drifts of the pressure and the pull.
-    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e5, 1e3, 1e5, 1e3];
+    /// Both drifts of the contraction, contraction and pull where nothing drifts, and the drift of the pull.
+    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e3, 1e3];
 
     fn is_neutral(&self) -> bool {
-        [self.amplitude_1, self.amplitude_2, self.pressure_amplitude, self.pull_amplitude] == [0.0; 4]
+        [self.amplitude_1, self.amplitude_2, self.pull_amplitude] == [0.0; 3]
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {
         let relaxed = self.relaxed_share * at.contraction;
         let settled = self.settled_share * (at.contraction - relaxed);
         own[..2].copy_from_slice(&[self.amplitude_1 * settled, self.amplitude_2 * settled]);
-        own[2..5].copy_from_slice(&[relaxed, at.gauge_pressure, at.pressure_pull]);
+        own[2..4].copy_from_slice(&[relaxed, at.pressure_pull]);
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let strain = at.contraction - own[2];
         rates[0] = self.rate(own[0], self.amplitude_1 * strain, self.time_1);
         rates[1] = self.rate(own[1], self.amplitude_2 * strain, self.time_2);
-        rates[5] = self.rate(own[5], self.pressure_amplitude * (at.gauge_pressure - own[3]), self.time_1);
-        rates[6] = self.rate(own[6], self.pull_amplitude * (at.pressure_pull - own[4]), self.time_1);
+        rates[4] = self.rate(own[4], self.pull_amplitude * (at.pressure_pull - own[3]), self.time_1);
     }
 
-    fn area_force(&self, at: &Point, own: &[f64], force: f64) -> f64 {
-        let has_area = self.pressure_amplitude != 0.0 && at.gauge_pressure > 0.0;
-        let force = if has_area { force * (1.0 + own[5] / at.gauge_pressure) } else { force };
-        if self.pull_amplitude == 0.0 { force } else { force + own[6] }
+    fn area_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
+        if self.pull_amplitude == 0.0 { force } else { force + own[4] }
     }
 
     fn effective_contraction(&self, _at: &Point, own: &[f64], contraction: f64) -> f64 {
@@ -122,12 +114,6 @@ impl Effect for Creep {
         let mut all = Vec::new();
         if !parts.is_empty() {
             all.push(format!("of every change of length it gives way by {}", parts.join(" and ")));
-        }
-        if self.pressure_amplitude != 0.0 {
-            all.push(format!(
-                "the pressure that the braid feels grows by {}",
-                one(self.pressure_amplitude, self.time_1)
-            ));
         }
         if self.pull_amplitude != 0.0 {
             all.push(format!("the pull of the pressure grows by {}", one(self.pull_amplitude, self.time_1)));

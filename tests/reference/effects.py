@@ -82,22 +82,6 @@ class UnevenCreep(Plant):
         return super().static_force(pressure, x - own[0], own)
 
 
-class PressureCreep(Plant):
-    """A share of what the pressure was on the mean of the last seconds is felt on top, less that of the start."""
-
-    own_scales = (1e5,)
-
-    def own_start(self, x):
-        self.at_start = VALVE_GAIN * STAIRS[0]
-        return [self.at_start]
-
-    def own_rates(self, target, pressure, x, velocity, own):
-        return [(pressure - own[0]) / 2.5]
-
-    def static_force(self, pressure, x, own):
-        return super().static_force(pressure + 0.2 * (own[0] - self.at_start), x, own)
-
-
 class PullCreep(Plant):
     """A share of what the pressure pulled on the mean of the last seconds comes on top, less that of the start."""
 
@@ -243,7 +227,6 @@ class Case:
 CASES = [
     Case("creep", Creep(), STAIRS),
     Case("uneven_creep", UnevenCreep(), STAIRS),
-    Case("pressure_creep", PressureCreep(), STAIRS),
     Case("pull_creep", PullCreep(), STAIRS),
     Case("resonance", Resonance(), STAIRS),
     Case("dead_time", DeadTime(), RAMPS),
