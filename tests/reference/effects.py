@@ -158,11 +158,11 @@ class Stiction(Plant):
 
 
 class Overlap(Plant):
-    """Nothing flows up to an error of 6 kPa, all that is wanted from 7.5 kPa on, in between the line from one to the other."""
+    """Nothing flows up to an error of 6 kPa, all that is wanted from 9 kPa on, in between the line from one to the other."""
 
     def pressure_rate(self, target, pressure, x, own):
         error = target - pressure
-        return VALVE_BANDWIDTH * np.sign(error) * np.interp(abs(error), [0, 6e3, 7.5e3, 1e6], [0, 0, 7.5e3, 1e6])
+        return VALVE_BANDWIDTH * np.sign(error) * np.interp(abs(error), [0, 6e3, 9e3, 1e6], [0, 0, 9e3, 1e6])
 
 
 class FlowLimit(Plant):
