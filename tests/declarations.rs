@@ -259,6 +259,7 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
         ("friction_hysteresis.second_ratio", 9.0),
         ("friction_hysteresis.knee", 2.0),
         ("friction_hysteresis.unloading", 0.3),
+        ("friction_hysteresis.smoothing_velocity", 0.03),
         ("friction_hysteresis.stribeck_share", 0.5),
         ("friction_hysteresis.stribeck_velocity", 0.03),
         ("friction_hysteresis.start", 0.7),

@@ -105,6 +105,14 @@ fn effects_agree_with_scipy() {
                 ("friction_hysteresis.start", 0.2),
             ],
         ),
+        (
+            "direct_friction",
+            &[
+                ("friction_hysteresis.half_width", 9.0),
+                ("friction_hysteresis.half_width_per_pressure", 8e-5),
+                ("friction_hysteresis.smoothing_velocity", 2e-3),
+            ],
+        ),
     ];
     for (name, effect) in cases {
         let (contraction, pressure) = differences("dmsp-40-1000", &format!("effect_{name}.csv"), effect);

@@ -3,6 +3,7 @@
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::{Description, Freed};
 use crate::least_squares::{self, Effort, Ended, Free, derivatives, linear_decrease, normal_matrix};
+use crate::muscle::ForceModelName;
 use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
 use nalgebra::{DMatrix, DVector};
@@ -10,11 +11,24 @@ use rayon::prelude::*;
 
 /// Corrections that every fit may make, in units of the declared tolerance of the nominal value: a muscle and its valve
 /// are never quite the preset. Damping is the least known coefficient, and other losses of a rig add to it.
-const COEFFICIENTS: [(&str, f64); 4] =
-    [("muscle.area_scale", 1.0), ("muscle.elastic_scale", 1.0), ("muscle.damping", 3.0), ("valve.bandwidth", 1.0)];
-/// Corrections of shape with their expected size in units of the tolerance: a polynomial is never quite the muscle, and its
-/// coefficients may be off each in its own direction.
-const SHAPES: [(&str, f64); 3] = [("muscle.area_tilt", 0.4), ("muscle.area_bend", 0.2), ("muscle.elastic_tilt", 0.6)];
+const COEFFICIENTS: [(&str, f64); 2] = [("muscle.damping", 3.0), ("valve.bandwidth", 1.0)];
+/// The same of a muscle whose force is a polynomial: each of its coefficients may be off by itself.
+const OF_POLYNOMIAL: [(&str, f64); 8] = [
+    ("virtual_area.area_0", 1.0),
+    ("virtual_area.area_1", 1.0),
+    ("virtual_area.area_2", 1.0),
+    ("virtual_area.area_3", 1.0),
+    ("virtual_area.elastic_0", 1.0),
+    ("virtual_area.elastic_1", 1.0),
+    ("virtual_area.elastic_2", 1.0),
+    ("virtual_area.elastic_3", 1.0),
+];
+/// Corrections of shape with their expected size in units of the tolerance: no polynomial is quite the muscle.
+const SHAPE_OF_POLYNOMIAL: [(&str, f64); 1] = [("muscle.area_bend", 0.1)];
+/// The same of any other force: its coefficients may all act alike, or cancel each other.
+const OF_OTHERS: [(&str, f64); 2] = [("muscle.area_scale", 1.0), ("muscle.elastic_scale", 1.0)];
+const SHAPE_OF_OTHERS: [(&str, f64); 3] =
+    [("muscle.area_tilt", 0.4), ("muscle.area_bend", 0.2), ("muscle.elastic_tilt", 0.6)];
 /// Of a fit that only has to show what a hypothesis is worth.
 const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
 /// Of a fit whose parameters count.
@@ -193,7 +207,12 @@ pub struct Start {
 
 /// Corrections that every fit may make of a nominal model that is good to `tolerance`, with their bounds and priors.
 pub fn corrections(nominal: &Parameters, tolerance: f64) -> Vec<(&'static Variable, Free)> {
-    let relative = COEFFICIENTS.iter().filter_map(|(name, share)| {
+    // A piston of constant area has no slope that could be off.
+    let is_polynomial =
+        nominal.muscle.force_model == ForceModelName::VirtualArea && nominal.force_models.virtual_area.area_1 != 0.0;
+    let (own, shapes): (&[_], &[_]) =
+        if is_polynomial { (&OF_POLYNOMIAL, &SHAPE_OF_POLYNOMIAL) } else { (&OF_OTHERS, &SHAPE_OF_OTHERS) };
+    let relative = own.iter().chain(&COEFFICIENTS).filter_map(|(name, share)| {
         let (variable, start) = declared(nominal, name);
         let size = share * tolerance * start.abs();
         // The deviation of a uniform distribution over the tolerance.
@@ -201,7 +220,7 @@ pub fn corrections(nominal: &Parameters, tolerance: f64) -> Vec<(&'static Variab
         let bounds = Free { start, lower: start - size, upper: start + size, typical: size, prior };
         (size > 0.0).then_some((variable, bounds))
     });
-    let shapes = SHAPES.iter().map(|(name, share)| {
+    let shapes = shapes.iter().map(|(name, share)| {
         let (variable, start) = declared(nominal, name);
         let size = share * tolerance;
         let (lower, upper) = (start - 3.0 * size, start + 3.0 * size);

@@ -120,6 +120,13 @@ impl<'a> Data<'a> {
         self.noise[&signal]
     }
 
+    /// Standard deviation of the estimated variance of a signal's noise, relative to it.
+    pub fn noise_doubt(&self, signal: Signal) -> f64 {
+        let of_signal = self.segments.iter().filter(|segment| segment.signal == signal);
+        let samples: usize = of_signal.map(|segment| segment.samples.len()).sum();
+        (2.0 * self.noise[&signal].inflation / samples as f64).sqrt()
+    }
+
     /// Noise per signal as the residuals of a model show it; they should come from a model that is about right.
     pub fn noise_in(&self, residuals: &[f64]) -> BTreeMap<Signal, Noise> {
         let estimates = |signal: Signal| {

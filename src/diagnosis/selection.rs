@@ -33,6 +33,8 @@ const ALSO_BY_FORM: f64 = 3.0;
 const MAY_RIVAL: f64 = 0.8;
 /// How many times the structural error of a sound model an error must be to be called unexplained.
 const UNEXPLAINED: f64 = 9.75;
+/// How many standard deviations of the noise's variance a sound model may leave: 0.1 % of all estimates are off by more.
+const NOISE_DOUBT: f64 = 3.0;
 /// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
 const BEAM: usize = 3;
 /// Most effects that are looked for at once.
@@ -245,7 +247,7 @@ impl<'a, 'b> Search<'a, 'b> {
         other.into_iter().chain([refined.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
     }
 
-    /// The hypothesis in another form of its last effect, where one is better: of the starts only the most promising were fitted.
+    /// The hypothesis in the best other form of its last effect: of the starts only the most promising were fitted.
     fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
         let last = judged.fitted.hypothesis.parts.last()?;
         let others = (0..last.effect.forms.len()).filter(|form| *form != last.form).collect::<Vec<_>>().into_par_iter();
@@ -255,7 +257,7 @@ impl<'a, 'b> Search<'a, 'b> {
             let hypothesis = judged.fitted.hypothesis.without(last.effect.name).with(part);
             Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
         });
-        fits.max_by(|a, b| a.score.total_cmp(&b.score)).filter(|other| other.score > judged.score)
+        fits.max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
@@ -355,7 +357,9 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Whether an error is no reason to call a model wrong.
     fn is_sound(&self, losses: &[Loss]) -> bool {
-        let allowance = |signal| NEGLIGIBLE + UNEXPLAINED.powi(2) * self.bench.data.structure(signal);
+        let data = &self.bench.data;
+        let doubt = |signal| NOISE_DOUBT * data.noise_doubt(signal);
+        let allowance = |signal| NEGLIGIBLE + doubt(signal) + UNEXPLAINED.powi(2) * data.structure(signal);
         beyond_noise(losses).into_iter().all(|(signal, beyond)| beyond <= allowance(signal))
     }
 

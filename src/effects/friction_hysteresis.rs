@@ -1,5 +1,8 @@
 use super::{Description, Effect, Point};
 
+/// Smallest velocity in m/s over which a friction without a loop changes its sign.
+const LEAST_SMOOTHING: f64 = 2e-4;
+
 crate::variables::variables! {
     /// Dry friction between threads and rubber: a loss that depends on the way, not on its speed.
     ///
@@ -8,7 +11,7 @@ crate::variables::variables! {
     /// within the displacements s and r s: s dz/dx = 1 − (γ sgn(v z) + 1 − γ) |z|ⁿ. `half_width` w₀,
     /// `half_width_per_pressure` w₁, `presliding_displacement` s, `second_share` m, `second_ratio` r, `knee` n,
     /// `unloading` γ, `stribeck_share` c, `stribeck_velocity` v_s. n = γ = 1 is the law of Dahl. Both z start at
-    /// `start` and stay within ±1.
+    /// `start` and stay within ±1. With a `smoothing_velocity` v₀ it is Coulomb's law without a memory, h = tanh(v/v₀).
     ///
     /// # In the data
     /// The force residual changes sign at every reversal; its width does not depend on speed. Triangles of shrinking
@@ -16,12 +19,14 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// Smooth loops, as of FESTO muscles whose threads are embedded in rubber. With the Stribeck term the load may creep
-    /// in jerks, but it never sticks for good.
+    /// in jerks, but it never sticks for good; with v₀ it sinks slowly where it should stick.
+    /// v₀ acts as 0.2 mm/s where it is less, so that no step of the integration becomes too short.
     ///
     /// # Reference
     /// P. Dahl (1968), A solid friction model, TOR-0158(3107-18)-1; Y. Wen (1976), Method for random vibration of
     /// hysteretic systems (n, γ); pressure dependence and Stribeck term as in Tondu and Lopez, thesis eq. 4.20, with the
-    /// sign function replaced by h.
+    /// sign function replaced by h; tanh(v/v₀): S. Andersson, A. Söderberg, S. Björklund (2007), Friction models for sliding
+    /// dry, boundary and mixed lubricated contacts, doi 10.1016/j.triboint.2005.11.014.
     pub struct FrictionHysteresis in "friction_hysteresis." as Tunable {
         /// Half width of the loop at zero pressure
         half_width: f64 = 0.0, NEWTON, (0.0..=300.0);
@@ -37,6 +42,8 @@ crate::variables::variables! {
         knee: f64 = 1.0, ONE, (0.5..=6.0);
         /// How much steeper the loop is right after a reversal: 1 twice as steep, 0.5 not at all
         unloading: f64 = 1.0, ONE, (0.0..=1.0);
+        /// Velocity at which most of a friction without a loop is there; 0: there is a loop
+        smoothing_velocity: f64 = 0.0, METRE_PER_SECOND, (0.0..=0.1);
         /// Relative excess of the friction at rest over that in motion
         stribeck_share: f64 = 0.0, ONE, (-0.5..=2.0);
         /// Velocity over which that excess fades
@@ -61,6 +68,14 @@ impl FrictionHysteresis {
         velocity * (1.0 - loading * z.abs().powf(self.knee))
     }
 
+    /// Share of the half width that acts, with its sign.
+    fn engaged(&self, velocity: f64, own: &[f64]) -> f64 {
+        if self.smoothing_velocity > 0.0 {
+            return (velocity / self.smoothing_velocity.max(LEAST_SMOOTHING)).tanh();
+        }
+        (1.0 - self.second_share) * own[0] + self.second_share * own[1]
+    }
+
     fn stribeck(&self, velocity: f64) -> f64 {
         if self.stribeck_share == 0.0 {
             return 1.0;
@@ -73,17 +88,24 @@ impl Effect for FrictionHysteresis {
     const DESCRIPTION: Description = Description {
         name: "friction_hysteresis",
         meaning: "dry friction in the braid: a loss that does not depend on speed",
-        equation: "F <- F - (w0 + w1 p) h (1 + c exp(-(v/v_s)^2)),  h of two elements s dz/dx = 1 - z sgn(v)",
+        equation: "F <- F - (w0 + w1 p) h (1 + c exp(-(v/v_s)^2)),  h of two elements s dz/dx = 1 - z sgn(v), or h = tanh(v/v0)",
         signature: "force residual changes sign at reversals, width independent of speed",
         experiment: "triangles of shrinking amplitude at three pressures",
-        reference: "Dahl 1968; Wen 1976; thesis eq. 4.20",
+        reference: "Dahl 1968; Wen 1976; Andersson et al. 2007; thesis eq. 4.20",
         of_load: false,
         exact: false,
-        forms: &[&[
-            ("friction_hysteresis.half_width", &[10.0, 25.0]),
-            ("friction_hysteresis.half_width_per_pressure", &[3e-5, 1e-4]),
-            ("friction_hysteresis.presliding_displacement", &[1e-3, 4e-3]),
-        ]],
+        forms: &[
+            &[
+                ("friction_hysteresis.half_width", &[10.0, 25.0]),
+                ("friction_hysteresis.half_width_per_pressure", &[3e-5, 1e-4]),
+                ("friction_hysteresis.presliding_displacement", &[1e-3, 4e-3]),
+            ],
+            &[
+                ("friction_hysteresis.half_width", &[10.0]),
+                ("friction_hysteresis.half_width_per_pressure", &[5e-5]),
+                ("friction_hysteresis.smoothing_velocity", &[2e-3]),
+            ],
+        ],
         refinements: &[
             ("friction_hysteresis.second_share", &[0.4]),
             ("friction_hysteresis.second_ratio", &[5.0]),
@@ -116,8 +138,8 @@ impl Effect for FrictionHysteresis {
         if self.is_neutral() {
             return force;
         }
-        let looped = (1.0 - self.second_share) * own[0] + self.second_share * own[1];
-        force - self.width(at.gauge_pressure) * looped * self.stribeck(at.contraction_velocity)
+        let engaged = self.engaged(at.contraction_velocity, own);
+        force - self.width(at.gauge_pressure) * engaged * self.stribeck(at.contraction_velocity)
     }
 
     fn sentence(&self) -> String {

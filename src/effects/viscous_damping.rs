@@ -18,7 +18,8 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// Together with `muscle.damping`, 80 N s/m by default, the sum must not be negative for the motion to be damped.
-    /// Below 1 mm/s the power law is rounded to a straight line.
+    /// Below 1 mm/s the power law is rounded to a straight line. A loss that hardly grows with speed, a below -0.6, is dry
+    /// friction.
     ///
     /// # Reference
     /// D. Reynolds et al. (2003), Modeling the dynamic characteristics of pneumatic muscle, doi 10.1114/1.1554921
@@ -29,7 +30,7 @@ crate::variables::variables! {
         /// Additional damping while the muscle lengthens
         extension: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-80.0..=1e4);
         /// Growth of the additional damping with speed: 0 none, 1 in proportion
-        exponent: f64 = 0.0, ONE, (-0.9..=2.0);
+        exponent: f64 = 0.0, ONE, (-0.6..=2.0);
         /// Relative growth of the additional damping with pressure, at 2 bar
         with_pressure: f64 = 0.0, ONE, (-1.0..=1.0);
         /// Relative growth of the additional damping with contraction, at 0.1 m

@@ -172,10 +172,20 @@ def imposed_motion(random, duration):
 
 
 def draw_specimen(random, same_form):
-    """Within 2 % of the preset, its area up to 0.15 % off a straight line, unless the fit is to hold the truth."""
-    factors = random.uniform(0.98, 1.02, 3)
+    """Within 2 % of the preset, its area up to 0.15 % off a straight line, unless the fit is to hold the truth.
+
+    In one half of all muscles area and elastic force are off as a whole, in the other each coefficient by itself.
+    """
+    each = random.random() < 0.5
+    area, elastic = (off_by(random, count if each else 1) * np.ones(count) for count in (2, 4))
+    damping = off_by(random, 1).item()
     ripple, phase = random.uniform(0, 0.0015), random.uniform(0, 2 * np.pi)
-    return Specimen(*factors, ripple=0.0 if same_form else ripple, ripple_phase=phase)
+    return Specimen(tuple(area), tuple(elastic), damping, ripple=0.0 if same_form else ripple, ripple_phase=phase)
+
+
+def off_by(random, count):
+    """Factors on that many coefficients of a sound muscle."""
+    return random.uniform(0.98, 1.02, count)
 
 
 def draw_noise(random):
@@ -336,7 +346,7 @@ def add_visibility(cases):
     """
     pairs = [(plan, run) for case, runs in cases for plan, run in zip(case.plans, runs, strict=True)]
     small = 0.01
-    changes = [{}, {"area": 1 + small}, {"elastic": 1 + small}, {"damping": 1 + small}]
+    changes = [{}, *one_coefficient_more(small)]
     references = iter(simulate([reference(*pair, **change) for pair in pairs for change in changes]))
     for case, runs in cases:
         rows = {}
@@ -351,6 +361,15 @@ def add_visibility(cases):
                 rows.setdefault(name, []).append(block)
         rows = {name: np.concatenate(blocks) for name, blocks in rows.items()}
         case.visibility = remaining(rows)
+
+
+def one_coefficient_more(share):
+    """Changes of a specimen, each of one of its coefficients."""
+    changes = [{"damping": 1 + share}]
+    for name in ("area", "elastic"):
+        nominal = getattr(Specimen, name)
+        changes += [{name: tuple(nominal + share * unit)} for unit in np.eye(len(nominal))]
+    return changes
 
 
 def remaining(rows):

@@ -19,10 +19,10 @@ KEPT = np.exp(-VALVE_RATE * STEP)  # by the nominal valve over a step
 
 @dataclass(frozen=True)
 class Specimen:
-    """One muscle: factors on the preset's coefficients, and how far its area is off a straight line."""
+    """One muscle: factors on each of the preset's coefficients, and how far its area is off a straight line."""
 
-    area: float = 1.0
-    elastic: float = 1.0
+    area: tuple = (1.0, 1.0)
+    elastic: tuple = (1.0, 1.0, 1.0, 1.0)
     damping: float = 1.0
     ripple: float = 0.0
     ripple_phase: float = 0.0
@@ -50,12 +50,13 @@ class Course:
     force: np.ndarray
 
 
-def area(x):
-    return 0.0091 - 0.0266 * x
+def area(x, factors=Specimen.area):
+    return 0.0091 * factors[0] - 0.0266 * factors[1] * x
 
 
-def elastic_force(x):
-    return -113.29 + x * (-8808.9 + x * (5.2111e4 - 1.0067e5 * x))
+def elastic_force(x, factors=Specimen.elastic):
+    linear, square, cube = -8808.9 * factors[1], 5.2111e4 * factors[2], -1.0067e5 * factors[3]
+    return -113.29 * factors[0] + x * (linear + x * (square + x * cube))
 
 
 def holding_pressure(x, mass):
@@ -68,8 +69,8 @@ class Now:
 
     def __init__(self, experiments):
         specimens = [experiment.specimen for experiment in experiments]
-        self.area_factor = np.array([s.area for s in specimens])
-        self.elastic_factor = np.array([s.elastic for s in specimens])
+        self.area_factors = np.array([s.area for s in specimens]).T
+        self.elastic_factors = np.array([s.elastic for s in specimens]).T
         self.nominal_damping = 80 * np.array([s.damping for s in specimens])
         self.ripple = np.array([s.ripple for s in specimens])
         self.ripple_phase = np.array([s.ripple_phase for s in specimens])
@@ -83,9 +84,15 @@ class Now:
         self.p = self.x = self.target = self.strain = self.damping = self.force = None
         self.time_constant = np.full(count, 1 / VALVE_RATE)
 
+    def own_area(self, at=slice(None)):
+        return area(self.strain[at], self.area_factors[:, at])
+
+    def own_elastic_force(self, at=slice(None)):
+        return elastic_force(self.strain[at], self.elastic_factors[:, at])
+
     def static_force(self):
         wave = 1 + self.ripple * np.sin(30 * self.strain + self.ripple_phase)
-        return self.p * self.area_factor * area(self.strain) * wave + self.elastic_factor * elastic_force(self.strain)
+        return self.p * self.own_area() * wave + self.own_elastic_force()
 
 
 def forms_together(experiments):

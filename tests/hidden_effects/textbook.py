@@ -26,7 +26,7 @@ from effects import (
     WeakSupply,
     either_sign,
 )
-from plant import STEP, area, elastic_force
+from plant import STEP
 
 
 class Dahl(Rubbing):
@@ -80,7 +80,7 @@ class ScaledBladder(Form):
         return {"more": severity * either_sign(random, 0.1, 0.35)}
 
     def act(self, now):
-        now.force[self.at] += self.more * now.elastic_factor[self.at] * elastic_force(now.strain[self.at])
+        now.force[self.at] += self.more * now.own_elastic_force(self.at)
 
 
 class ConstantEnds(Form):
@@ -104,7 +104,7 @@ class ExponentialThreshold(Form):
     def act(self, now):
         p = np.maximum(now.p[self.at], 0)
         lost = np.minimum(self.lost * np.exp(-p / self.fade), p)
-        now.force[self.at] -= lost * now.area_factor[self.at] * area(now.strain[self.at])
+        now.force[self.at] -= lost * now.own_area(self.at)
 
 
 class WarmArea(WarmUp):
@@ -112,7 +112,7 @@ class WarmArea(WarmUp):
 
     def act(self, now):
         warm = self.change * (1 - np.exp(-max(now.time, 0.0) / self.duration))
-        pull = now.p[self.at] * now.area_factor[self.at] * area(now.strain[self.at])
+        pull = now.p[self.at] * now.own_area(self.at)
         now.force[self.at] += warm * pull
 
 

@@ -213,6 +213,13 @@ class Friction(Plant):
         return super().force(pressure, x, velocity, own) - stribeck
 
 
+class DirectFriction(Plant):
+    """Coulomb's law without a memory, its step rounded."""
+
+    def force(self, pressure, x, velocity, own):
+        return super().force(pressure, x, velocity, own) - (9 + 8e-5 * pressure) * np.tanh(velocity / 2e-3)
+
+
 STAIRS = staircase([0.8, 1.5, 2.0, 1.2], 1.2)
 RAMPS = ramps([(0, 1.0), (0.3, 1.0), (1.5, 2.0), (2.0, 2.0), (2.6, 1.4), (3.0, 1.9), (3.6, 1.2), (4.4, 1.3), (5, 1.3)])
 
@@ -238,6 +245,7 @@ CASES = [
     Case("series_elasticity", SeriesElasticity(), RAMPS),
     Case("threshold", Threshold(), STAIRS),
     Case("friction", Friction(), RAMPS),
+    Case("direct_friction", DirectFriction(), RAMPS),
 ]
 
 

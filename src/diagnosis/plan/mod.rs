@@ -24,11 +24,9 @@ use power::{Bank, Corrections};
 
 /// λ from which two models are told apart beyond doubt: five standard deviations.
 pub const ENOUGH: f64 = 25.0;
-/// Experiments of each kind whose rivals are fitted, the most promising ones.
-const FITTED: usize = 2;
 /// Damping and cut-off of the valve are known this much worse than areas: no experiment should hang on them.
 const DYNAMIC_SLACK: f64 = 3.0;
-/// Most experiments that are reported.
+/// Most experiments that are reported, the most promising ones of each kind; their rivals are fitted until one suffices.
 const REPORTED: usize = 8;
 /// Longest experiment by default, s.
 pub const USUAL_DURATION: f64 = 60.0;
@@ -350,10 +348,10 @@ impl Choice {
         let mut screened: Vec<Screened> = screened.collect();
         screened.sort_by(order);
         screened.truncate(REPORTED);
-        // Only what promises something is worth the fits, and the second only where the first falls short.
+        // Only what promises something is worth the fits, and a further one only where those before fall short.
         let promised = screened.first().map_or(0, |best| told_apart(&best.lambda));
         if promised > 0 && task.rivals.len() <= FEW_RIVALS {
-            for promising in screened.iter_mut().take(FITTED) {
+            for promising in &mut screened {
                 promising.lambda = bank.fitted(&promising.experiment.runs, &sensors);
                 promising.fitted = true;
                 if told_apart(&promising.lambda) >= promised {
