@@ -60,9 +60,10 @@ fn a_hanging_load_is_replayed() {
             muscle.slopes.command = (command(k + 1) - command(k)) / STEP;
             muscle.advance(STEP).unwrap();
         }
-        // The mean of the first pressures is not quite the first.
+        // The mean of the first pressures is not quite the first; friction without a loop answers the motion of a tenth of a
+        // millimetre per second that comes of it with 1.14 N.
         let recording = parse(&text);
-        for (signal, close) in [(Signal::GaugePressure, 300.0), (Signal::Contraction, 4e-4), (Signal::Force, 1.0)] {
+        for (signal, close) in [(Signal::GaugePressure, 300.0), (Signal::Contraction, 4e-4), (Signal::Force, 1.2)] {
             let difference = difference(&parameters, &recording, signal);
             assert!(difference < close, "{} {signal:?} {difference}", effect.name);
         }

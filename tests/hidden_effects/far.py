@@ -709,6 +709,7 @@ SINCE_HELD = [
     SettlingPressure,
     SettlingZero,
     ShutNearTarget,
+    SteepFriction,
     Throttle,
     TwoMorePoles,
     UnevenCreep,
