@@ -51,20 +51,9 @@ def same_forms(sinew, tmp_path_factory):
     return {path.stem: json.loads(path.read_text()) for path in sorted((folder / "truths").glob("*.json"))}, folder
 
 
-# Of the preset, as plant.py has them.
-COEFFICIENTS = {"area": (0.0091, -0.0266), "elastic": (-113.29, -8808.9, 5.2111e4, -1.0067e5)}
-
-
-def own_coefficients(muscle):
-    """Parameters of a muscle that is off the preset."""
-    each = [(name, k, value) for name, values in COEFFICIENTS.items() for k, value in enumerate(values)]
-    own = {f"virtual_area.{name}_{k}": value * muscle[name][k] for name, k, value in each}
-    return {**own, "muscle.damping": 80 * muscle["damping"]}
-
-
 def errors_in_noise_levels(sinew, truth, recordings, folder):
     """Of a simulation with the true parameters, one number per recording and signal."""
-    parameters = {**own_coefficients(truth["specimen"]), **truth["parameters"]}
+    parameters = {**truth["own_parameters"], **truth["parameters"]}
     file = write_parameters(folder / "truth.toml", parameters)
     done = run(sinew, "simulate", *recordings, "--parameters", file, "--out", folder / "simulated", "--json")
     errors = json.loads(done.stdout)["errors"]

@@ -14,7 +14,7 @@ IMPROBABLE = 1e-3
 CLAIMED = {
     "full size": {
         NAMED: 0.88,
-        NOMINAL: 0.98,
+        NOMINAL: 0.99,
         NO_NAME: 0.9,
         BOTH_NAMED: 0.6,
         FIRST_OF_TWO: 0.8,

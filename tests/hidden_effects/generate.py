@@ -439,6 +439,7 @@ def write_case(random, name, case, runs, out):
         "visibility": case.visibility,
         "same_form": case.same_form,
         "parameters": parameters_of(case),
+        "own_parameters": case.specimen.parameters(),
         "specimen": vars(case.specimen),
         "relaxed": case.plans[0].experiment.relaxed,
         "recordings": [

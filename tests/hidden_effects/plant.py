@@ -15,6 +15,10 @@ SETTLE = 2.5  # s of rest, strongly damped, before the recording starts
 VALVE_GAIN = 1e5
 VALVE_RATE = 2 * np.pi * 2.5
 KEPT = np.exp(-VALVE_RATE * STEP)  # by the nominal valve over a step
+# Of the preset: area in m2 and elastic force in N over powers of the contraction in m, damping in N s/m.
+AREA = (0.0091, -0.0266)
+ELASTIC_FORCE = (-113.29, -8808.9, 5.2111e4, -1.0067e5)
+DAMPING = 80
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,13 @@ class Specimen:
     damping: float = 1.0
     ripple: float = 0.0
     ripple_phase: float = 0.0
+
+    def parameters(self):
+        """In the tool's own names, but for the ripple."""
+        area = {f"virtual_area.area_{k}": f * own for k, (f, own) in enumerate(zip(self.area, AREA, strict=True))}
+        both = zip(self.elastic, ELASTIC_FORCE, strict=True)
+        elastic = {f"virtual_area.elastic_{k}": factor * own for k, (factor, own) in enumerate(both)}
+        return {**area, **elastic, "muscle.damping": DAMPING * self.damping}
 
 
 @dataclass(frozen=True)
@@ -51,12 +62,12 @@ class Course:
 
 
 def area(x, factors=Specimen.area):
-    return 0.0091 * factors[0] - 0.0266 * factors[1] * x
+    return AREA[0] * factors[0] + AREA[1] * factors[1] * x
 
 
 def elastic_force(x, factors=Specimen.elastic):
-    linear, square, cube = -8808.9 * factors[1], 5.2111e4 * factors[2], -1.0067e5 * factors[3]
-    return -113.29 * factors[0] + x * (linear + x * (square + x * cube))
+    first, linear, square, cube = (own * factors[k] for k, own in enumerate(ELASTIC_FORCE))
+    return first + x * (linear + x * (square + x * cube))
 
 
 def holding_pressure(x, mass):
@@ -71,7 +82,7 @@ class Now:
         specimens = [experiment.specimen for experiment in experiments]
         self.area_factors = np.array([s.area for s in specimens]).T
         self.elastic_factors = np.array([s.elastic for s in specimens]).T
-        self.nominal_damping = 80 * np.array([s.damping for s in specimens])
+        self.nominal_damping = DAMPING * np.array([s.damping for s in specimens])
         self.ripple = np.array([s.ripple for s in specimens])
         self.ripple_phase = np.array([s.ripple_phase for s in specimens])
         self.mass = np.array([experiment.mass or 1.0 for experiment in experiments])
