@@ -477,6 +477,9 @@ fn run_comparison(
 fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {
     let bar = progress(Effects::DESCRIPTIONS.len() + 1);
     let found = diagnose(parameters, recordings, tolerance, &|name| {
+        if bar.length() == Some(bar.position()) {
+            bar.reset(); // a second round
+        }
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;

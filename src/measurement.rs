@@ -228,12 +228,12 @@ impl Recording {
         *steps.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
-    /// The recording with samples no closer than `period` s, as far as at least a thousand remain. Samples are left
-    /// out; the command is a weighted mean, its weight falling to zero at the next sample that stays, so that a step
-    /// between two of them keeps its time.
+    /// The recording with about one sample per `period` in s, as far as there are as many and at least a thousand remain.
+    /// Samples are left out; the command is a weighted mean, its weight falling to zero at the next sample that stays, so that
+    /// a step between two of them keeps its time.
     pub fn thinned(&self, period: f64) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let every = ((1.01 * period / self.period()) as usize).min(self.time.len() / THINNED_SAMPLES).max(1);
+        let every = ((period / self.period()).round() as usize).min(self.time.len() / THINNED_SAMPLES).max(1);
         let kept = || (0..self.time.len()).step_by(every);
         let picked = |values: &[f64]| kept().map(|k| values[k]).collect();
         let mean = |values: &[f64], centre: usize| {

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// Corrections that every fit may make, in units of the declared tolerance of the nominal value: a muscle and its valve
 /// are never quite the preset. Damping is the least known coefficient, and other losses of a rig add to it.
 const COEFFICIENTS: [(&str, f64); 2] = [("muscle.damping", 3.0), ("valve.bandwidth", 1.0)];
-/// The same of a muscle whose force is a polynomial: each of its coefficients may be off by itself.
+/// The same of a muscle whose force is a polynomial, where each of its coefficients may be off by itself.
 const OF_POLYNOMIAL: [(&str, f64); 8] = [
     ("virtual_area.area_0", 1.0),
     ("virtual_area.area_1", 1.0),
@@ -25,10 +25,29 @@ const OF_POLYNOMIAL: [(&str, f64); 8] = [
 ];
 /// Corrections of shape with their expected size in units of the tolerance: no polynomial is quite the muscle.
 const SHAPE_OF_POLYNOMIAL: [(&str, f64); 1] = [("muscle.area_bend", 0.1)];
-/// The same of any other force: its coefficients may all act alike, or cancel each other.
-const OF_OTHERS: [(&str, f64); 2] = [("muscle.area_scale", 1.0), ("muscle.elastic_scale", 1.0)];
-const SHAPE_OF_OTHERS: [(&str, f64); 3] =
+/// The same of any other force, whose coefficients may all act alike or cancel each other, and of one that is off as a whole.
+const AS_A_WHOLE: [(&str, f64); 2] = [("muscle.area_scale", 1.0), ("muscle.elastic_scale", 1.0)];
+const SHAPE_AS_A_WHOLE: [(&str, f64); 3] =
     [("muscle.area_tilt", 0.4), ("muscle.area_bend", 0.2), ("muscle.elastic_tilt", 0.6)];
+/// How a nominal muscle may be off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Off {
+    /// Each coefficient of its polynomials by itself.
+    Each,
+    /// Area and elastic force as a whole, and a little in their course.
+    AsAWhole,
+}
+
+impl Off {
+    /// The ways in which the coefficients of a model may be off, the one that allows more first.
+    pub fn of(nominal: &Parameters) -> &'static [Self] {
+        // A piston of constant area has no slope that could be off.
+        let is_polynomial = nominal.muscle.force_model == ForceModelName::VirtualArea
+            && nominal.force_models.virtual_area.area_1 != 0.0;
+        if is_polynomial { &[Self::Each, Self::AsAWhole] } else { &[Self::AsAWhole] }
+    }
+}
+
 /// Of a fit that only has to show what a hypothesis is worth.
 const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
 /// Of a fit whose parameters count.
@@ -206,12 +225,11 @@ pub struct Start {
 }
 
 /// Corrections that every fit may make of a nominal model that is good to `tolerance`, with their bounds and priors.
-pub fn corrections(nominal: &Parameters, tolerance: f64) -> Vec<(&'static Variable, Free)> {
-    // A piston of constant area has no slope that could be off.
-    let is_polynomial =
-        nominal.muscle.force_model == ForceModelName::VirtualArea && nominal.force_models.virtual_area.area_1 != 0.0;
-    let (own, shapes): (&[_], &[_]) =
-        if is_polynomial { (&OF_POLYNOMIAL, &SHAPE_OF_POLYNOMIAL) } else { (&OF_OTHERS, &SHAPE_OF_OTHERS) };
+pub fn corrections(nominal: &Parameters, tolerance: f64, off: Off) -> Vec<(&'static Variable, Free)> {
+    let (own, shapes): (&[_], &[_]) = match off {
+        Off::Each => (&OF_POLYNOMIAL, &SHAPE_OF_POLYNOMIAL),
+        Off::AsAWhole => (&AS_A_WHOLE, &SHAPE_AS_A_WHOLE),
+    };
     let relative = own.iter().chain(&COEFFICIENTS).filter_map(|(name, share)| {
         let (variable, start) = declared(nominal, name);
         let size = share * tolerance * start.abs();
@@ -243,8 +261,8 @@ pub struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     /// Prepares fits of a nominal model that is good to `tolerance`.
-    pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64) -> Self {
-        let corrections = corrections(nominal, tolerance);
+    pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64, off: Off) -> Self {
+        let corrections = corrections(nominal, tolerance, off);
         let weights = data.weights(Scope::All);
         Self { data, nominal, corrections, slopes: Vec::new(), weights }
     }

@@ -26,7 +26,7 @@ use crate::quality;
 use crate::simulation::replay;
 use crate::variables::Declared;
 use crate::{Error, Result};
-use candidates::{Bench, Fitted};
+use candidates::{Bench, Fitted, Off};
 use residuals::Data;
 use residuals::Scope;
 use selection::{Chosen, Judged, Search};
@@ -36,9 +36,9 @@ use std::collections::BTreeMap;
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
 
-/// Samples closer than this, s, are not used one by one in fits: two hundred a second resolve the fastest effect, and more
-/// of them only take longer.
-const FINEST_PERIOD: f64 = 5e-3;
+/// About as many seconds are between samples that fits use: a hundred samples a second resolve the fastest effect, and more of
+/// them only take longer.
+const FINEST_PERIOD: f64 = 1e-2;
 
 /// Tolerance of the integration in fits: a tenth of a micrometre is far below all noise, and dry friction takes a third less time
 /// than with [`crate::integrator::TOLERANCE`].
@@ -139,7 +139,7 @@ pub struct Diagnosis {
 /// Diagnoses recordings against a nominal model.
 ///
 /// `tolerance` is the relative error of the nominal coefficients below which nothing is called wrong; `done` is told
-/// after each of the `1 + candidates` fits.
+/// after each of the `1 + candidates` fits, of which there may be two rounds.
 ///
 /// # Errors
 /// [`Error::Recording`] where nothing can be compared; errors of the simulation of the nominal model.
@@ -159,15 +159,32 @@ pub fn diagnose(
     };
     let data = Data::new(recordings, nominal, tolerance)?;
     let thinned: Vec<Recording> = recordings.iter().map(|recording| recording.thinned(FINEST_PERIOD)).collect();
-    let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
-    for_fits.integration = INTEGRATION;
-    let mut bench = Bench::new(for_fits, nominal, tolerance);
-    let first = bench.baseline().ok_or_else(cannot_follow)?;
-    bench.refine_noise(&first.residuals);
-    let baseline = bench.baseline().ok_or_else(cannot_follow)?;
-    done("nominal");
-    let chosen = Search::new(&mut bench, baseline).run(done).ok_or_else(cannot_follow)?;
+    let searched = |off: Off| {
+        let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
+        for_fits.integration = INTEGRATION;
+        let mut bench = Bench::new(for_fits, nominal, tolerance, off);
+        let chosen = search(&mut bench, done).ok_or_else(cannot_follow)?;
+        Ok((bench, chosen))
+    };
+    let ways = Off::of(nominal);
+    let (mut bench, mut chosen) = searched(ways[0])?;
+    // Coefficients that are each off by themselves can stand for a good part of a further cause.
+    if let Some(off) = ways.get(1).filter(|_| chosen.leaves_something(&bench.data)) {
+        let (other_bench, other) = searched(*off)?;
+        if other.adds_to(&chosen, &bench.data) {
+            (bench, chosen) = (other_bench, other);
+        }
+    }
     answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
+}
+
+/// The causes of what the nominal model leaves; `None` where it cannot be simulated.
+fn search(bench: &mut Bench, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
+    let first = bench.baseline()?;
+    bench.refine_noise(&first.residuals);
+    let baseline = bench.baseline()?;
+    done("nominal");
+    Search::new(bench, baseline).run(done)
 }
 
 /// The choice in words and figures, its errors on all samples.

@@ -2,7 +2,7 @@
 
 use super::Verdict;
 use super::candidates::{Bench, Fitted, Part, Refined, Start, has_many_minima, neutralised};
-use super::residuals::{Loss, Scope};
+use super::residuals::{Data, Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
 use rayon::prelude::*;
@@ -111,6 +111,28 @@ fn left_by_form(before: f64) -> f64 {
 
 fn total(beyond_noise: &BTreeMap<Signal, f64>) -> f64 {
     beyond_noise.values().sum()
+}
+
+impl Chosen {
+    /// Whether something is wrong of which the model leaves more than noise.
+    pub fn leaves_something(&self, data: &Data) -> bool {
+        let left = beyond_noise(&data.losses(&self.model.residuals, Scope::All));
+        let is_more = |(signal, left)| left > NEGLIGIBLE + data.structure(signal);
+        self.verdict != Verdict::Nominal && left.into_iter().any(is_more)
+    }
+
+    /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither fit
+    /// saw better beyond doubt.
+    pub fn adds_to(&self, other: &Self, data: &Data) -> bool {
+        let explains = matches!(self.verdict, Verdict::Explained | Verdict::Ambiguous) && !self.saw_all;
+        let (causes, fewer) = (&self.model.hypothesis, &other.model.hypothesis.parts);
+        let mut known = fewer.iter().zip(&other.alternatives);
+        let unseen = |chosen: &Self| data.losses(&chosen.model.residuals, Scope::HeldOut);
+        explains
+            && causes.parts.len() > fewer.len()
+            && known.all(|(part, rivals)| causes.has(part.effect.name) || rivals.iter().any(|rival| causes.has(rival)))
+            && gain(&unseen(other), &unseen(self)) > LEAST_EVIDENCE
+    }
 }
 
 /// The search for the causes of what a baseline leaves.

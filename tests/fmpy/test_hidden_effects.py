@@ -22,23 +22,25 @@ def test_fresh_hidden_effects_are_named_as_often_as_claimed(sinew, tmp_path, not
     assert done.returncode == 0, f"{done.stderr}\n{done.stdout}"
 
 
-# Alone, another effect looks better than either, and the ceiling beside the gain is another one than without it.
-HARD_PAIR = ("valve_gain", "supply_saturation")
+# Alone, another effect may look better than either of a pair; end effects may pass for coefficients of the muscle that
+# are off, and the ceiling beside the gain is another one than without it.
+HARD_PAIRS = ["end_effects+contraction_sensor_delay", "valve_gain+supply_saturation"]
 
 
-def test_a_pair_of_which_neither_leads_alone_is_named(sinew, tmp_path, note):
-    options = ["--seed", 424242, "--effects", "+".join(HARD_PAIR) + ":4", "--out", tmp_path]
-    run(sys.executable, HIDDEN_EFFECTS / "generate.py", *options)
-    named = 0
-    for folder in sorted((tmp_path / "cases").iterdir()):
-        run(sinew, "diagnose", *sorted(folder.glob("*.csv")), "--out", tmp_path / "found")
+def test_pairs_of_which_neither_leads_alone_are_named(sinew, tmp_path, note):
+    effects = ",".join(f"{pair}:4" for pair in HARD_PAIRS)
+    run(sys.executable, HIDDEN_EFFECTS / "generate.py", "--seed", 424242, "--effects", effects, "--out", tmp_path)
+    named = {pair: 0 for pair in HARD_PAIRS}
+    for truth in sorted((tmp_path / "truths").glob("*.json")):
+        hidden = json.loads(truth.read_text())["effects"]
+        run(sinew, "diagnose", *sorted((tmp_path / "cases" / truth.stem).glob("*.csv")), "--out", tmp_path / "found")
         causes = json.loads((tmp_path / "found" / "diagnosis.json").read_text())["causes"]
         # Without a force sensor a gain of the valve is one of the pressure sensor, too.
         sets = [{cause["effect"], *cause["alternatives"]} for cause in causes]
-        is_right = all(any(effect in found and len(found) <= 2 for found in sets) for effect in HARD_PAIR)
-        named += len(causes) == 2 and is_right
-    note(f"Pair named in {named} of 4")
-    assert named >= 3, named
+        is_right = all(any(effect in found and len(found) <= 2 for found in sets) for effect in hidden)
+        named["+".join(hidden)] += len(causes) == 2 and is_right
+    note(f"Pairs named of four each: {named}")
+    assert all(count >= 3 for count in named.values()), named
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ pub use excitations::EXCITATIONS;
 pub use files::{files, matrix, to_json};
 pub use rivals::{Rival, Task};
 
-use super::candidates::corrections;
+use super::candidates::{Off, corrections};
 use crate::measurement::Signal;
 use crate::parameters::Parameters;
 use crate::{Error, Result};
@@ -243,7 +243,8 @@ pub fn plan(
     limits: &Limits,
     done: &(dyn Fn(&str) + Sync),
 ) -> Result<Plan> {
-    let bank = Bank::new(&task.rivals, nominal, slack(corrections(nominal, tolerance)), limits, done);
+    let corrections = corrections(nominal, tolerance, Off::of(nominal)[0]);
+    let bank = Bank::new(&task.rivals, nominal, slack(corrections), limits, done);
     let experiments = experiments(&bank, limits);
     let mut best: Option<Choice> = None;
     for needs in levels(task, limits) {
