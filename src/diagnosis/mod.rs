@@ -36,9 +36,10 @@ use std::collections::BTreeMap;
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
 
-/// About as many seconds are between samples that fits use: a hundred samples a second resolve the fastest effect, and more of
-/// them only take longer.
-const FINEST_PERIOD: f64 = 1e-2;
+/// Seconds between samples that fits use, about: two hundred a second resolve the fastest effect, and more only take longer.
+/// Of long recordings a hundred do, where more would be above [`MANY_SAMPLES`] in all.
+const PERIODS: (f64, f64) = (5e-3, 1e-2);
+const MANY_SAMPLES: f64 = 13e3;
 
 /// Tolerance of the integration in fits: a tenth of a micrometre is far below all noise, and dry friction takes a third less time
 /// than with [`crate::integrator::TOLERANCE`].
@@ -158,7 +159,7 @@ pub fn diagnose(
         problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
     };
     let data = Data::new(recordings, nominal, tolerance)?;
-    let thinned: Vec<Recording> = recordings.iter().map(|recording| recording.thinned(FINEST_PERIOD)).collect();
+    let thinned = thinned(recordings);
     let searched = |off: Off| {
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;
@@ -176,6 +177,13 @@ pub fn diagnose(
         }
     }
     answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
+}
+
+/// The recordings with as many samples as fits need.
+fn thinned(recordings: &[Recording]) -> Vec<Recording> {
+    let span = |recording: &Recording| recording.time[recording.time.len() - 1] - recording.time[0];
+    let period = recordings.iter().map(span).sum::<f64>() / MANY_SAMPLES;
+    recordings.iter().map(|recording| recording.thinned(period.clamp(PERIODS.0, PERIODS.1))).collect()
 }
 
 /// The causes of what the nominal model leaves; `None` where it cannot be simulated.

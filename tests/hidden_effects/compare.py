@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from fit import name_by_fit, read_case
-from generate import add_options, wanted_truths, write_cases
+from generate import Kind, add_options, wanted_truths, write_cases
 from judge import covers, judge_all, library
 from report import table, wilson
 from sindy import name_by_sindy
@@ -118,7 +118,8 @@ def main():
     truths = wanted_truths(options.effects, options.cases, options.seed, known)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        names = write_cases(truths, options.severity, options.seed, folder, options.jobs, visible=False)
+        kind = Kind(options.severity, session=options.session)
+        names = write_cases(truths, kind, options.seed, folder, options.jobs, visible=False)
         warm_up(folder, names)
         ways, lines = compare(folder, names, options.sinew)
     columns = [dict(rows_of(way, known)) for way in ways.values()]

@@ -17,7 +17,7 @@ from collections import defaultdict
 from pathlib import Path
 
 from effects import KNOWN
-from generate import write_cases
+from generate import Kind, write_cases
 from judge import judge_all, library
 from report import wilson
 
@@ -47,7 +47,7 @@ def measure(effects, size, options):
     truths = [effect for effect in effects for _ in range(options.cases)]
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        names = write_cases(truths, size, options.seed, folder, options.jobs, visible=options.visibility)
+        names = write_cases(truths, Kind(size), options.seed, folder, options.jobs, visible=options.visibility)
         outcomes = judge_all(names, options.sinew, folder, options.jobs)
     return [line_of(outcome, size, options.seed) for outcome in outcomes]
 

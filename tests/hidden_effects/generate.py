@@ -65,6 +65,28 @@ OF_VALVE = {
 }  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Session:
+    """What was recorded of a case: how many recordings, their durations in s, samples per second."""
+
+    recordings: tuple
+    seconds: tuple
+    rates: tuple
+
+
+USUAL = Session(recordings=(1, 2, 3), seconds=(22, 38), rates=(50, 80, 100, 125, 200))
+LONG = Session(recordings=(2,), seconds=(65, 65), rates=(200,))  # 26 000 samples
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What cases have in common: the size of their effects, whether these have the forms of the fit, the session."""
+
+    severity: float = 1.0
+    same_form: bool = False
+    session: Session = USUAL
+
+
 @dataclass
 class Plan:
     """One recording before it is made."""
@@ -82,11 +104,10 @@ class Case:
     """What is hidden, and the recordings that hide it."""
 
     effects: tuple
-    severity: float
+    kind: Kind
     hidden: tuple
     specimen: Specimen
     noise: dict
-    same_form: bool = False
     plans: list = field(default_factory=list)
     visibility: float | None = None
 
@@ -227,41 +248,42 @@ def draw_mass(random, effects):
     return float(np.round(np.exp(random.uniform(np.log(10), np.log(heaviest))), 1))
 
 
-def draw_hidden(random, effects, severity, same_form):
+def draw_hidden(random, effects, kind):
     """Pairs of form and size. Near forms and far ones are equally likely, however many there are."""
     hidden = []
     for effect in effects:
-        if same_form:
+        if kind.same_form:
             forms = SAME_FORM[effect][:1]
         else:
             forms = FAR[effect] if effect in FAR and random.random() < 0.5 else FORMS[effect]
         form = forms[random.integers(len(forms))]
-        hidden.append((form, form.sizes(random, severity)))
+        hidden.append((form, form.sizes(random, kind.severity)))
     return hidden
 
 
-def draw_case(random, truth, severity, same_form):
+def draw_case(random, truth, kind):
     effects = () if truth == "none" else tuple(truth.split("+"))
     driven = not HANGING_ONLY & set(effects) and random.random() < DRIVEN_SHARE
     columns = draw_columns(random, effects, driven)
-    masses = [None if driven else draw_mass(random, effects) for _ in range(random.integers(1, 4))]
-    hidden = draw_hidden(random, effects, severity, same_form)
-    specimen, noise = draw_specimen(random, same_form), draw_noise(random)
-    rate, jitter = random.choice([50, 80, 100, 125, 200]), random.choice([0.0, random.uniform(0.02, 0.2)])
-    relaxed = bool(random.random() < 0.5) or same_form
+    masses = [None if driven else draw_mass(random, effects) for _ in range(random.choice(kind.session.recordings))]
+    hidden = draw_hidden(random, effects, kind)
+    specimen, noise = draw_specimen(random, kind.same_form), draw_noise(random)
+    rate, jitter = random.choice(kind.session.rates), random.choice([0.0, random.uniform(0.02, 0.2)])
+    relaxed = bool(random.random() < 0.5) or kind.same_form
     excitations = [random.choice(list(EXCITATIONS)) for _ in masses]
-    bare = [draw_experiment(random, mass, kind) for mass, kind in zip(masses, excitations, strict=True)]
+    both = list(zip(masses, excitations, strict=True))
+    bare = [draw_experiment(random, mass, excitation, kind.session.seconds) for mass, excitation in both]
     hidden = tuple((form, form.suited(size, bare)) for form, size in hidden)
-    case = Case(effects, severity, hidden, specimen, noise, same_form)
-    for experiment, kind in zip(bare, excitations, strict=True):
+    case = Case(effects, kind, hidden, specimen, noise)
+    for experiment, excitation in zip(bare, excitations, strict=True):
         full = replace(experiment, specimen=specimen, hidden=hidden, relaxed=relaxed)
-        case.plans.append(Plan(full, experiment.mass, columns, str(kind), float(rate), float(jitter)))
+        case.plans.append(Plan(full, experiment.mass, columns, str(excitation), float(rate), float(jitter)))
     return case
 
 
-def draw_experiment(random, mass, excitation):
+def draw_experiment(random, mass, excitation, seconds):
     """Without specimen and effects, as yet."""
-    duration = random.uniform(22, 38)
+    duration = random.uniform(*seconds)
     if mass is None:
         low, high = random.uniform(0.8, 1.5), random.uniform(2.5, 4.5)
         command = low + (high - low) * course(random, excitation, duration)
@@ -383,7 +405,7 @@ def is_feasible(run):
     return ALLOWED[0] < run.contraction.min() and run.contraction.max() < ALLOWED[1]
 
 
-def make(numbered, severity, seed, same_form=False):
+def make(numbered, kind, seed):
     """Cases for pairs of number and truth, with the courses of their recordings, in the order given.
 
     What leaves the feasible range is drawn anew.
@@ -394,7 +416,7 @@ def make(numbered, severity, seed, same_form=False):
         open_cases = [k for k, case in enumerate(made) if case is None]
         if not open_cases:
             return made
-        drawn = [draw_case(randoms[k], numbered[k][1], severity, same_form) for k in open_cases]
+        drawn = [draw_case(randoms[k], numbered[k][1], kind) for k in open_cases]
         runs = iter(simulate([plan.experiment for case in drawn for plan in case.plans]))
         for k, case in zip(open_cases, drawn, strict=True):
             own = [next(runs) for _ in case.plans]
@@ -409,7 +431,7 @@ def plain(value):
 
 def parameters_of(case):
     """True values by the tool's names, where it has such parameters."""
-    if not case.same_form:
+    if not case.kind.same_form:
         return {}
     sizes = zip(case.effects, case.hidden, strict=True)
     return {name: value for effect, (_, size) in sizes for name, value in true_parameters(effect, size).items()}
@@ -432,12 +454,12 @@ def write_case(random, name, case, runs, out):
     truth = {
         "effect": "+".join(case.effects) or "none",
         "effects": case.effects,
-        "severity": case.severity,
+        "severity": case.kind.severity,
         "forms": [form.__name__ for form, _ in case.hidden],
-        "near_or_far": ["same" if case.same_form else NEAR_OR_FAR.get(form) for form, _ in case.hidden],
+        "near_or_far": ["same" if case.kind.same_form else NEAR_OR_FAR.get(form) for form, _ in case.hidden],
         "sizes": [{key: plain(value) for key, value in size.items()} for _, size in case.hidden],
         "visibility": case.visibility,
-        "same_form": case.same_form,
+        "same_form": case.kind.same_form,
         "parameters": parameters_of(case),
         "own_parameters": case.specimen.parameters(),
         "specimen": vars(case.specimen),
@@ -453,8 +475,8 @@ def write_case(random, name, case, runs, out):
     (out / "truths" / f"{name}.json").write_text(json.dumps(truth, indent=1, default=plain))
 
 
-def write_block(numbered, severity, seed, out, visible, same_form):
-    made = make(numbered, severity, seed, same_form)
+def write_block(numbered, kind, seed, out, visible):
+    made = make(numbered, kind, seed)
     if visible:
         add_visibility(made)
     for (number, _), (case, runs) in zip(numbered, made, strict=True):
@@ -462,12 +484,12 @@ def write_block(numbered, severity, seed, out, visible, same_form):
         write_case(np.random.default_rng([seed, number, 1]), f"case_{number:04d}", case, runs, out)
 
 
-def write_cases(truths, severity, seed, out, jobs=1, visible=True, same_form=False):
+def write_cases(truths, kind, seed, out, jobs=1, visible=True):
     """Writes cases for a list of truths; gives their names. Without `visible` that costly number is left out."""
     numbered = sorted(enumerate(truths), key=lambda pair: pair[1])  # like effects side by side: that is faster
     size = min(CASES_PER_BLOCK, -(-len(numbered) // jobs))
     blocks = [numbered[start : start + size] for start in range(0, len(numbered), size)]
-    write = partial(write_block, severity=severity, seed=seed, out=Path(out), visible=visible, same_form=same_form)
+    write = partial(write_block, kind=kind, seed=seed, out=Path(out), visible=visible)
     (Path(out) / "cases").mkdir(parents=True, exist_ok=True)
     if jobs == 1:
         list(map(write, blocks))
@@ -525,6 +547,14 @@ def add_options(parser):
         " any-known, any-unknown and pairs (that many drawn at random)",
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side")
+    parser.add_argument(
+        "--long",
+        dest="session",
+        action="store_const",
+        const=LONG,
+        default=USUAL,
+        help="two recordings of 13 000 samples each; with `--jobs 1` to see how long a case takes",
+    )
 
 
 def main():
@@ -536,7 +566,8 @@ def main():
     add_options(parser)
     options = parser.parse_args()
     truths = wanted_truths(options.effects, options.cases, options.seed)
-    write_cases(truths, options.severity, options.seed, options.out, options.jobs, same_form=options.same_form)
+    kind = Kind(options.severity, options.same_form, options.session)
+    write_cases(truths, kind, options.seed, options.out, options.jobs)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from claims import contradictions
-from generate import add_options, wanted_truths, write_cases
+from generate import Kind, add_options, wanted_truths, write_cases
 from judge import judge_all, library
 from report import Score, markdown, print_score
 from textbook import SAME_FORM
@@ -25,11 +25,8 @@ SIZES = {1.0: "full size", 0.333: "one third"}
 
 
 @dataclass(frozen=True)
-class Run:
-    """Cases of one size, hidden in forms of their own or in those that the fit itself uses."""
-
-    severity: float
-    same_form: bool
+class Run(Kind):
+    """Cases of one kind."""
 
     @property
     def title(self):
@@ -48,7 +45,7 @@ def fresh_seed():
 def wanted_runs(options):
     severities = [float(severity) for severity in options.severity.split(",")]
     same_form = {None: [False], "beside": [False, True], "only": [True]}[options.same_form]
-    return [Run(severity, same) for severity in severities for same in same_form]
+    return [Run(severity, same, options.session) for severity in severities for same in same_form]
 
 
 def score_run(run, options, seed, known, folder):
@@ -59,7 +56,7 @@ def score_run(run, options, seed, known, folder):
         truths = wanted_truths(options.effects, options.cases, seed, known)
         if run.same_form:
             truths = [truth for truth in truths if truth == "none" or truth in SAME_FORM]
-        names = write_cases(truths, run.severity, seed, folder, options.jobs, not options.check, run.same_form)
+        names = write_cases(truths, run, seed, folder, options.jobs, not options.check)
     outcomes = judge_all(names, options.sinew, folder, options.jobs, keep=bool(options.keep or options.again))
     return Score(outcomes, known)
 
