@@ -29,25 +29,6 @@ const SHAPE_OF_POLYNOMIAL: [(&str, f64); 1] = [("muscle.area_bend", 0.1)];
 const AS_A_WHOLE: [(&str, f64); 2] = [("muscle.area_scale", 1.0), ("muscle.elastic_scale", 1.0)];
 const SHAPE_AS_A_WHOLE: [(&str, f64); 3] =
     [("muscle.area_tilt", 0.4), ("muscle.area_bend", 0.2), ("muscle.elastic_tilt", 0.6)];
-/// How a nominal muscle may be off.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Off {
-    /// Each coefficient of its polynomials by itself.
-    Each,
-    /// Area and elastic force as a whole, and a little in their course.
-    AsAWhole,
-}
-
-impl Off {
-    /// The ways in which the coefficients of a model may be off, the one that allows more first.
-    pub fn of(nominal: &Parameters) -> &'static [Self] {
-        // A piston of constant area has no slope that could be off.
-        let is_polynomial = nominal.muscle.force_model == ForceModelName::VirtualArea
-            && nominal.force_models.virtual_area.area_1 != 0.0;
-        if is_polynomial { &[Self::Each, Self::AsAWhole] } else { &[Self::AsAWhole] }
-    }
-}
-
 /// Of a fit that only has to show what a hypothesis is worth.
 const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
 /// Of a fit whose parameters count.
@@ -222,6 +203,25 @@ pub struct Start {
     pub choice: usize,
     /// The model.
     pub parameters: Parameters,
+}
+
+/// How a nominal muscle may be off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Off {
+    /// Each coefficient of its polynomials by itself.
+    Each,
+    /// Area and elastic force as a whole, and a little in their course.
+    AsAWhole,
+}
+
+impl Off {
+    /// The ways in which the coefficients of a model may be off, the one that allows more first.
+    pub fn of(nominal: &Parameters) -> &'static [Self] {
+        // A piston of constant area has no slope that could be off.
+        let is_polynomial = nominal.muscle.force_model == ForceModelName::VirtualArea
+            && nominal.force_models.virtual_area.area_1 != 0.0;
+        if is_polynomial { &[Self::Each, Self::AsAWhole] } else { &[Self::AsAWhole] }
+    }
 }
 
 /// Corrections that every fit may make of a nominal model that is good to `tolerance`, with their bounds and priors.

@@ -113,12 +113,16 @@ fn total(beyond_noise: &BTreeMap<Signal, f64>) -> f64 {
     beyond_noise.values().sum()
 }
 
+/// What is left beyond noise and the structural error that a sound model may have.
+fn unsound(left: &BTreeMap<Signal, f64>, data: &Data) -> f64 {
+    left.iter().map(|(signal, left)| (left - NEGLIGIBLE - data.structure(*signal)).max(0.0)).sum()
+}
+
 impl Chosen {
     /// Whether something is wrong of which the model leaves more than noise.
     pub fn leaves_something(&self, data: &Data) -> bool {
         let left = beyond_noise(&data.losses(&self.model.residuals, Scope::All));
-        let is_more = |(signal, left)| left > NEGLIGIBLE + data.structure(signal);
-        self.verdict != Verdict::Nominal && left.into_iter().any(is_more)
+        self.verdict != Verdict::Nominal && unsound(&left, data) > 0.0
     }
 
     /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither fit
@@ -150,15 +154,10 @@ impl<'a, 'b> Search<'a, 'b> {
     fn judge(&self, fitted: Fitted) -> Judged {
         let evidence = evidence(&self.baseline, &fitted);
         let (before, after) = (beyond_noise(&self.baseline.losses), beyond_noise(&fitted.losses));
-        let explained = 1.0 - self.unsound(&after) / total(&before).max(f64::MIN_POSITIVE);
+        let explained = 1.0 - unsound(&after, &self.bench.data) / total(&before).max(f64::MIN_POSITIVE);
         let score = self.bench.data.log_likelihood(&fitted.losses)
             - 0.5 * fitted.hypothesis.size() as f64 * (fitted.residuals.len() as f64).ln();
         Judged { fitted, evidence, score, explained }
-    }
-
-    /// What is left beyond noise and the structural error that a sound model may have.
-    fn unsound(&self, left: &BTreeMap<Signal, f64>) -> f64 {
-        left.iter().map(|(signal, left)| (left - NEGLIGIBLE - self.bench.data.structure(*signal)).max(0.0)).sum()
     }
 
     /// Finds the causes; `done` is told after each candidate.
@@ -481,7 +480,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let unseen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, Scope::HeldOut);
         let (without, with) = (unseen(&baseline), unseen(trained));
         let (before, after) = (beyond_noise(&without), beyond_noise(&with));
-        let explained = 1.0 - self.unsound(&after) / total(&before).max(f64::MIN_POSITIVE);
+        let explained = 1.0 - unsound(&after, &self.bench.data) / total(&before).max(f64::MIN_POSITIVE);
         Some(gain(&without, &with) > 0.0 && explained > least_explained(trained).1)
     }
 
