@@ -284,6 +284,7 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
         ("flow_limit.volume_growth", 0.5),
         ("leakage.choked_share", 0.5),
         ("leakage.volume_growth", 0.5),
+        ("leakage.opening_pressure", 0.5e5),
         ("temperature_drift.time_constant", 5.0),
     ] {
         moved.set(parameter, value).unwrap();

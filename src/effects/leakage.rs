@@ -2,7 +2,7 @@ use super::{AMBIENT_PRESSURE, Description, Effect, Point};
 
 /// Ratio of pressures below which the flow through a hole is choked: a sharp edge.
 const CRITICAL_RATIO: f64 = 0.3;
-/// Gauge pressure in Pa at which a porous wall leaks alike whatever its exponent.
+/// Pressure in Pa above the opening at which a porous wall leaks alike whatever its exponent.
 const REFERENCE_PRESSURE: f64 = 2e5;
 /// Gauge pressure in Pa over which the last of the flow through a hole fades; not physical, it keeps the slope finite.
 const FADE: f64 = 500.0;
@@ -11,9 +11,10 @@ crate::variables::variables! {
     /// Air that is lost while the valve goes on blowing.
     ///
     /// # Model
-    /// dp/dt ← dp/dt − k ((1 − c) p (p/2 bar)^(e−1) + c (p + p_a) ψ(p)) / (1 + `volume_growth` x/0.1 m): `rate` k,
-    /// `exponent` e, `choked_share` c of the leak that is a hole and not a porous wall. ψ = 1 while the flow is choked, p_a/(p + p_a) < b = 0.3, and
-    /// √(1 − ((p_a/(p + p_a) − b)/(1 − b))²) above. The pressure cannot fall below ambient.
+    /// dp/dt ← dp/dt − k ((1 − c) q (q/2 bar)^(e−1) + c (p + p_a) ψ(p)) / (1 + `volume_growth` x/0.1 m), q = max(p − `opening_pressure`, 0):
+    /// `rate` k, `exponent` e, `choked_share` c of the leak that is a hole and not a porous wall or a seal that pressure lifts. ψ = 1 while
+    /// the flow is choked, p_a/(p + p_a) < b = 0.3, and √(1 − ((p_a/(p + p_a) − b)/(1 − b))²) above. The pressure cannot fall below
+    /// ambient.
     ///
     /// # In the data
     /// With the valve shut, the pressure decays; while it regulates, the pressure falls short by k p/ω and the response
@@ -29,8 +30,10 @@ crate::variables::variables! {
         rate: f64 = 0.0, PER_SECOND, (0.0..=50.0);
         /// Share of the leak that is a hole, with flow in proportion to absolute pressure
         choked_share: f64 = 0.0, ONE, (0.0..=1.0);
-        /// Power of the gauge pressure in what is lost through a porous wall, 1 at 2 bar
+        /// Power of the pressure in what is lost through a porous wall, 1 at 2 bar
         exponent: f64 = 1.0, ONE, (0.3..=3.0);
+        /// Gauge pressure up to which a seal is tight
+        opening_pressure: f64 = 0.0, PASCAL, (0.0..=3e5);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
     }
@@ -47,9 +50,9 @@ fn hole(gauge_pressure: f64) -> f64 {
 impl Leakage {
     /// What is lost at a gauge pressure in Pa, in Pa: times the rate it is a loss per time.
     fn flow(&self, gauge_pressure: f64) -> f64 {
-        let mut porous = gauge_pressure;
+        let mut porous = (gauge_pressure - self.opening_pressure).max(0.0);
         if self.exponent != 1.0 {
-            porous *= (gauge_pressure / REFERENCE_PRESSURE).powf(self.exponent - 1.0).min(1e3);
+            porous *= (porous / REFERENCE_PRESSURE).powf(self.exponent - 1.0).min(1e3);
         }
         if self.choked_share == 0.0 {
             return porous;
@@ -62,7 +65,7 @@ impl Effect for Leakage {
     const DESCRIPTION: Description = Description {
         name: "leakage",
         meaning: "pressure is lost in proportion to pressure",
-        equation: "dp/dt <- dp/dt - k ((1 - c) p (p/2 bar)^(e-1) + c (p + p_a) psi(p))",
+        equation: "dp/dt <- dp/dt - k ((1 - c) q (q/2 bar)^(e-1) + c (p + p_a) psi(p)), q = max(p - p_o, 0)",
         signature: "decay with the valve shut; shortfall of the pressure while regulated, and a faster response",
         experiment: "shut the valve and watch the pressure for a minute",
         reference: "ISO 6358",
@@ -73,6 +76,7 @@ impl Effect for Leakage {
             ("leakage.choked_share", &[0.5]),
             ("leakage.volume_growth", &[0.3]),
             ("leakage.exponent", &[1.3]),
+            ("leakage.opening_pressure", &[0.3e5]),
         ],
     };
 

@@ -182,6 +182,13 @@ class Leakage(Plant):
         return VALVE_BANDWIDTH * (target - pressure) - leak
 
 
+class LiftingSeal(Plant):
+    """Tight up to 0.9 bar."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        return VALVE_BANDWIDTH * (target - pressure) - 0.8 * max(pressure - 0.9e5, 0.0) / (1 + 4 * x)
+
+
 class SeriesElasticity(Plant):
     def reading(self, x, force):
         return x - 8e-6 * 400 * (force / 400) ** 0.85
@@ -242,6 +249,7 @@ CASES = [
     Case("overlap", Overlap(), STAIRS),
     Case("flow_limit", FlowLimit(), STAIRS),
     Case("leakage", Leakage(), STAIRS),
+    Case("lifting_seal", LiftingSeal(), STAIRS),
     Case("series_elasticity", SeriesElasticity(), RAMPS),
     Case("threshold", Threshold(), STAIRS),
     Case("friction", Friction(), RAMPS),
