@@ -1,13 +1,11 @@
 //! Bounded nonlinear least squares.
 //!
 //! # Model
-//! Levenberg–Marquardt on Σ r², with steps projected onto the bounds and parameters at a bound that push outwards left
-//! out of the step. Derivatives are forward differences, taken in parallel; those of parameters that act almost linearly
+//! Levenberg–Marquardt on Σ r², each step the minimum of the damped quadratic within the bounds. Derivatives are forward differences, taken in parallel; those of parameters that act almost linearly
 //! may be given and cost nothing then. A prior counts as one more residual.
 //!
 //! # Reference
-//! D. Marquardt (1963), doi 10.1137/0111030; projection as in C. Kanzow, N. Yamashita, M. Fukushima (2004),
-//! doi 10.1016/j.cam.2004.02.013. Own code because `levenberg-marquardt` 0.15 has no bounds.
+//! D. Marquardt (1963), doi 10.1137/0111030; bounds as in [`bounded_minimum`]. Own code because `levenberg-marquardt` 0.15 has no bounds.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -226,59 +224,75 @@ pub fn normal_matrix(columns: &[Vec<f64>]) -> DMatrix<f64> {
 }
 
 /// How much Σ r², priors among them, can decrease when columns are added to the residuals in amounts within bounds.
-///
-/// Coordinate descent on the quadratic, which is convex; a hundred sweeps are plenty for a forecast.
 pub fn linear_decrease(residuals: &[f64], columns: &[Vec<f64>], free: &[Free]) -> f64 {
     let mut normal = normal_matrix(columns);
-    let mut gradient: Vec<f64> = columns.iter().map(|column| dot(column, residuals)).collect();
+    let mut gradient = DVector::from_fn(columns.len(), |k, _| dot(&columns[k], residuals));
     for (k, free) in free.iter().enumerate() {
         if let Some((mean, deviation)) = free.prior {
             normal[(k, k)] += deviation.powi(-2);
             gradient[k] -= mean / deviation.powi(2);
         }
     }
-    let mut amounts = DVector::zeros(columns.len());
-    for _ in 0..100 {
-        for k in 0..columns.len() {
-            let slope = gradient[k] + normal.row(k).transpose().dot(&amounts);
-            let change = if normal[(k, k)] > 0.0 { -slope / normal[(k, k)] } else { 0.0 };
-            amounts[k] = f64::clamp(amounts[k] + change, free[k].lower, free[k].upper);
-        }
-    }
-    let linear: f64 = gradient.iter().zip(amounts.iter()).map(|(g, a)| g * a).sum();
-    -2.0 * linear - (&normal * &amounts).dot(&amounts)
+    let bounds: Vec<(f64, f64)> = free.iter().map(|free| (free.lower, free.upper)).collect();
+    let amounts = bounded_minimum(&damped(&normal, SINGULAR), &gradient, &bounds);
+    -2.0 * gradient.dot(&amounts) - (&normal * &amounts).dot(&amounts)
 }
 
-/// The damped step of Gauss and Newton within the bounds: a parameter that would leave them stops there, and the others
-/// are solved for anew.
+/// The damped step of Gauss and Newton within the bounds.
 fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, free: &[Free], parameters: &[f64], damping: f64) -> Vec<f64> {
-    let pushes_out = |k: usize| {
-        (parameters[k] <= free[k].lower && gradient[k] > 0.0) || (parameters[k] >= free[k].upper && gradient[k] < 0.0)
-    };
-    let mut moving: Vec<usize> = (0..free.len()).filter(|&k| !pushes_out(k)).collect();
-    let mut trial = parameters.to_vec();
-    loop {
-        let stopped = DVector::from_fn(free.len(), |k, _| {
-            if moving.contains(&k) { 0.0 } else { (trial[k] - parameters[k]) / free[k].typical }
-        });
-        let pull = gradient + normal * stopped;
-        let matrix = DMatrix::from_fn(moving.len(), moving.len(), |i, j| {
-            let entry = normal[(moving[i], moving[j])];
-            // The small constant keeps a parameter that nothing depends on where it is.
-            if i == j { entry * (1.0 + damping) + 1e-9 } else { entry }
-        });
-        let right = DVector::from_fn(moving.len(), |i, _| -pull[moving[i]]);
-        let Some(solution) = matrix.cholesky().map(|factor| factor.solve(&right)) else { return parameters.to_vec() };
-        for (&k, change) in moving.iter().zip(solution.iter()) {
-            trial[k] = parameters[k] + change * free[k].typical;
+    let both = free.iter().zip(parameters);
+    let bounds: Vec<(f64, f64)> =
+        both.map(|(free, at)| ((free.lower - at) / free.typical, (free.upper - at) / free.typical)).collect();
+    let step = bounded_minimum(&damped(normal, damping), gradient, &bounds);
+    let moved = (0..free.len()).map(|k| parameters[k] + step[k] * free[k].typical);
+    moved.zip(free).map(|(value, free)| value.clamp(free.lower, free.upper)).collect()
+}
+
+/// Share of the diagonal that is added to a matrix that may be singular.
+const SINGULAR: f64 = 1e-9;
+
+/// A matrix with a share of its diagonal added, and a little more: it keeps a parameter that nothing depends on where it is.
+fn damped(normal: &DMatrix<f64>, share: f64) -> DMatrix<f64> {
+    let mut damped = normal.clone();
+    damped.set_diagonal(&normal.diagonal().map(|entry| entry * (1.0 + share) + 1e-9));
+    damped
+}
+
+/// Minimum of gᵀs + sᵀHs/2 for a positive definite H, with s within bounds that hold zero; zero where H is not.
+///
+/// Active sets: the minimum over the components that are not held is gone for until one meets its bound, which is then
+/// held; at such a minimum the one that is held against the steepest descent is let go (J. Nocedal, S. Wright (2006),
+/// Numerical Optimization, algorithm 16.3).
+fn bounded_minimum(matrix: &DMatrix<f64>, gradient: &DVector<f64>, bounds: &[(f64, f64)]) -> DVector<f64> {
+    let count = bounds.len();
+    let mut at = DVector::zeros(count);
+    let mut held = vec![false; count];
+    // Each bound is met and left a few times at most; the limit is against rounding.
+    for _ in 0..20 * count {
+        let moving: Vec<usize> = (0..count).filter(|&k| !held[k]).collect();
+        let slopes = gradient + matrix * &at;
+        let reduced = DMatrix::from_fn(moving.len(), moving.len(), |i, j| matrix[(moving[i], moving[j])]);
+        let Some(factor) = reduced.cholesky() else { return DVector::zeros(count) };
+        let way = factor.solve(&DVector::from_fn(moving.len(), |i, _| -slopes[moving[i]]));
+        let until_bound = |(&k, &change): (&usize, &f64)| {
+            let bound = if change > 0.0 { bounds[k].1 } else { bounds[k].0 };
+            if change == 0.0 { (f64::INFINITY, k, bound) } else { ((bound - at[k]) / change, k, bound) }
+        };
+        let first = moving.iter().zip(way.iter()).map(until_bound).min_by(|a, b| a.0.total_cmp(&b.0));
+        let share = first.map_or(1.0, |(share, ..)| share.min(1.0));
+        moving.iter().zip(way.iter()).for_each(|(&k, change)| at[k] += share * change);
+        if let Some((_, k, bound)) = first.filter(|(share, ..)| *share < 1.0) {
+            (at[k], held[k]) = (bound, true);
+            continue;
         }
-        let before = moving.len();
-        moving.retain(|&k| (free[k].lower..=free[k].upper).contains(&trial[k]));
-        trial.iter_mut().zip(free).for_each(|(value, free)| *value = value.clamp(free.lower, free.upper));
-        if moving.len() == before {
-            return trial;
-        }
+        let slopes = gradient + matrix * &at;
+        // How steeply the cost falls towards the inside, where both bounds are not the same.
+        let inwards = |k: usize| if at[k] > bounds[k].0 { slopes[k] } else { -slopes[k] } / matrix[(k, k)].sqrt();
+        let steepest = (0..count).filter(|&k| held[k] && bounds[k].0 < bounds[k].1).map(|k| (inwards(k), k));
+        let Some((_, k)) = steepest.filter(|(fall, _)| *fall > 1e-9).max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        held[k] = false;
     }
+    at
 }
 
 #[cfg(test)]
@@ -306,6 +320,27 @@ mod tests {
         let found = fit(&residuals, &[free(0.0, -1.0, 1.0), free(0.0, -5.0, 5.0)], &[], EFFORT);
         assert_eq!(found.parameters[0], 1.0);
         assert!((found.parameters[1] + 1.0).abs() < 2e-3, "{found:?}");
+    }
+
+    #[test]
+    fn the_minimum_within_bounds_is_one() {
+        // Badly conditioned, as powers of the same variable are; the conditions of Karush, Kuhn and Tucker tell a minimum.
+        for seed in 1..200_u32 {
+            let random = |k: usize| (f64::from(seed) * 12.9898 + k as f64 * 78.233).sin() * 43758.5453 % 1.0;
+            let columns: Vec<Vec<f64>> =
+                (0..8).map(|p| (0..40).map(|k| (1.0 + random(k)).powi(p) + 1e-3 * random(50 * k)).collect()).collect();
+            let normal = damped(&normal_matrix(&columns), SINGULAR);
+            let gradient = DVector::from_fn(8, |k, _| 20.0 * random(1000 + k));
+            let bounds: Vec<_> = (0..8).map(|k| (-random(k).abs(), random(9 * k).abs())).collect();
+            let at = bounded_minimum(&normal, &gradient, &bounds);
+            let slopes = gradient + &normal * &at;
+            for (k, (low, high)) in bounds.into_iter().enumerate() {
+                let small = 1e-6 * normal[(k, k)].sqrt();
+                assert!((low..=high).contains(&at[k]), "{seed}");
+                assert!(slopes[k] > -small || at[k] == high, "{seed}: {k} could grow, {}", slopes[k]);
+                assert!(slopes[k] < small || at[k] == low, "{seed}: {k} could shrink, {}", slopes[k]);
+            }
+        }
     }
 
     #[test]

@@ -81,10 +81,7 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("leakage", &[("leakage.rate", 0.8), ("leakage.choked_share", 0.4), ("leakage.volume_growth", 0.4)]),
-        (
-            "lifting_seal",
-            &[("leakage.rate", 0.8), ("leakage.opening_pressure", 0.9e5), ("leakage.volume_growth", 0.4)],
-        ),
+        ("lifting_seal", &[("leakage.rate", 0.8), ("leakage.opening_pressure", 0.9e5), ("leakage.volume_growth", 0.4)]),
         ("series_elasticity", &[("series_elasticity.compliance", -8e-6), ("series_elasticity.exponent", 0.85)]),
         (
             "threshold",
