@@ -316,10 +316,20 @@ impl PlantMemory {
         self.pilot = (!slack.is_none()).then_some(pilot);
     }
 
-    /// Command that the valve sees at a time in s: value, slope, and how long that holds; `None` where it sees the
-    /// command itself.
-    pub fn seen_command(&self, time: f64) -> Option<(f64, f64, f64)> {
-        (!self.command.is_empty()).then(|| self.command.look_up(time))
+    /// Command that the valve sees at a time in s, late by other times in s where it rises and where it falls: value, slope, and
+    /// how long that holds; `None` where it sees the command itself.
+    pub fn seen_command(&self, time: f64, [rising, falling]: [f64; 2]) -> Option<(f64, f64, f64)> {
+        if self.command.is_empty() {
+            return None;
+        }
+        let [one, other] = [rising, falling].map(|delay| self.command.look_up(time - delay));
+        // Which of the two leads tells the direction; they change places where their lines cross.
+        let ahead = (one.0 - other.0, one.1 - other.1);
+        let crossing = -ahead.0 / ahead.1;
+        let until_crossing = if crossing > SAME_INSTANT { crossing } else { f64::INFINITY };
+        let is_larger = if crossing.abs() <= SAME_INSTANT || ahead.0 == 0.0 { ahead.1 > 0.0 } else { ahead.0 > 0.0 };
+        let (value, slope, _) = if is_larger == (rising < falling) { one } else { other };
+        Some((value, slope, one.2.min(other.2).min(until_crossing)))
     }
 
     /// The past of the contraction, for sensors that show it late.

@@ -438,9 +438,8 @@ fn felt<S: System>(
 ) -> Passage<S::Inputs> {
     let (mut inputs, mut slopes) = (step.inputs.along(&step.slopes, after), step.slopes);
     let mut span = step.duration - after;
-    if let Some((value, slope, lasts)) =
-        memory.seen_command(step.time + after - step.parameters.effects.command_delay())
-    {
+    let delays = step.parameters.effects.command_delays();
+    if let Some((value, slope, lasts)) = memory.seen_command(step.time + after, delays) {
         (*command(&mut inputs), *command(&mut slopes)) = (value, slope);
         span = span.min(lasts);
     }

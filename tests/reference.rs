@@ -66,7 +66,26 @@ fn effects_agree_with_scipy() {
         ("uneven_creep", &[("creep.amplitude_1", 0.1), ("creep.time_1", 1.5), ("creep.return_ratio", 2.0)]),
         ("pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5)]),
         ("resonance", &[("valve_resonance.natural_frequency", 25.0), ("valve_resonance.damping_ratio", 0.35)]),
+        (
+            "relaxation",
+            &[
+                ("creep.relaxing_stiffness_1", 1500.0),
+                ("creep.time_1", 1.5),
+                ("creep.relaxing_stiffness_2", 600.0),
+                ("creep.time_2", 8.0),
+            ],
+        ),
+        (
+            "regulator",
+            &[
+                ("valve_resonance.natural_frequency", 25.0),
+                ("valve_resonance.damping_ratio", 0.35),
+                ("valve_resonance.lead", 1.0),
+            ],
+        ),
+        ("slower_when_short", &[("valve_lag.time_constant", 0.03), ("valve_lag.growth_with_contraction", 0.7)]),
         ("dead_time", &[("valve_dead_time.delay", 0.0373)]),
+        ("uneven_dead_time", &[("valve_dead_time.delay", 0.0373), ("valve_dead_time.falling_excess", 0.5)]),
         ("play", &[("valve_dead_band.play", 0.11)]),
         ("stiction", &[("valve_dead_band.stiction", 0.17)]),
         ("overlap", &[("valve_dead_band.pressure_overlap", 6e3), ("valve_dead_band.overlap_steepness", 3.0)]),

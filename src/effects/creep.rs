@@ -8,6 +8,8 @@ crate::variables::variables! {
     /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing
     /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The pressure pulls by d_F more, with
     /// τ₁ dd_F/dt + d_F = a_F (A p − A(0) p(0)), `pull_amplitude` a_F. While a drift goes back, its time is `return_ratio` τ.
+    /// A standard linear solid is stiffer for fast changes: springs kᵢ in parallel with the membrane, `relaxing_stiffness_1` and
+    /// `relaxing_stiffness_2`, pull back with kᵢ eᵢ, deᵢ/dt = dx/dt − eᵢ/τᵢ, with `return_ratio` τᵢ while eᵢ < 0.
     ///
     /// # In the data
     /// Contraction drifts for seconds at constant measured pressure, unlike up and down; in a prescribed motion the force
@@ -19,7 +21,7 @@ crate::variables::variables! {
     /// simulation starts at rest; a relaxed share of zero is a muscle that comes from its rest length.
     ///
     /// # Reference
-    /// Kelvin–Voigt model of viscoelasticity; for muscles T. Minh et al. (2010),
+    /// Kelvin–Voigt model and standard linear solid of viscoelasticity; for muscles T. Minh et al. (2010),
     /// doi 10.1016/j.mechatronics.2010.04.003 (creep and hysteresis of a McKibben muscle). That rubber recovers at another
     /// pace than it gives way: I. Ward, J. Sweeney (2012), Mechanical Properties of Solid Polymers, ch. 11.
     pub struct Creep in "creep." as Tunable {
@@ -37,6 +39,10 @@ crate::variables::variables! {
         settled_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Drift of the pull of the pressure, per pull
         pull_amplitude: f64 = 0.0, ONE, (-0.5..=1.0);
+        /// Stiffness that relaxes with the first time constant
+        relaxing_stiffness_1: f64 = 0.0, NEWTON_PER_METRE, (0.0..=5e4);
+        /// Stiffness that relaxes with the second time constant
+        relaxing_stiffness_2: f64 = 0.0, NEWTON_PER_METRE, (0.0..=5e4);
         /// Time in which a drift goes back, relative to that in which it grows
         return_ratio: f64 = 1.0, ONE, (0.05..=20.0);
     }
@@ -54,7 +60,7 @@ impl Effect for Creep {
     const DESCRIPTION: Description = Description {
         name: "creep",
         meaning: "slow visco-elastic drift of the membrane at constant pressure",
-        equation: "x <- x - d1 - d2;  tau_i d(d_i)/dt + d_i = a_i (x - x_r);  A p <- A p + d_F",
+        equation: "x <- x - d1 - d2;  tau_i d(d_i)/dt + d_i = a_i (x - x_r);  A p <- A p + d_F;  F <- F - k_i e_i",
         signature: "drift over seconds at constant measured pressure",
         experiment: "hold for a minute after a step, up and down",
         reference: "Kelvin-Voigt; Minh et al. 2010",
@@ -63,6 +69,7 @@ impl Effect for Creep {
         forms: &[
             &[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.pull_amplitude", &[0.15]), ("creep.time_1", &[1.5, 10.0])],
+            &[("creep.relaxing_stiffness_1", &[1e3]), ("creep.time_1", &[1.5, 10.0])],
         ],
         refinements: &[
             ("creep.amplitude_2", &[0.05]),
@@ -71,13 +78,16 @@ impl Effect for Creep {
             ("creep.settled_share", &[0.5]),
             ("creep.pull_amplitude", &[0.05]),
             ("creep.return_ratio", &[1.5]),
+            ("creep.relaxing_stiffness_2", &[500.0]),
         ],
     };
-    /// Both drifts of the contraction, contraction and pull where nothing drifts, and the drift of the pull.
-    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e3, 1e3];
+    /// Both drifts of the contraction, contraction and pull where nothing drifts, the drift of the pull, and how far both springs
+    /// are stretched.
+    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e3, 1e3, 0.1, 0.1];
 
     fn is_neutral(&self) -> bool {
-        [self.amplitude_1, self.amplitude_2, self.pull_amplitude] == [0.0; 3]
+        [self.amplitude_1, self.amplitude_2, self.pull_amplitude, self.relaxing_stiffness_1, self.relaxing_stiffness_2]
+            == [0.0; 5]
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {
@@ -92,10 +102,21 @@ impl Effect for Creep {
         rates[0] = self.rate(own[0], self.amplitude_1 * strain, self.time_1);
         rates[1] = self.rate(own[1], self.amplitude_2 * strain, self.time_2);
         rates[4] = self.rate(own[4], self.pull_amplitude * (at.pressure_pull - own[3]), self.time_1);
+        for (k, time) in [(5, self.time_1), (6, self.time_2)] {
+            let time = if own[k] < 0.0 { self.return_ratio * time } else { time };
+            rates[k] = at.contraction_velocity - own[k] / time;
+        }
     }
 
     fn area_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
         if self.pull_amplitude == 0.0 { force } else { force + own[4] }
+    }
+
+    fn elastic_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
+        if self.is_neutral() {
+            return force;
+        }
+        force - self.relaxing_stiffness_1 * own[5] - self.relaxing_stiffness_2 * own[6]
     }
 
     fn effective_contraction(&self, _at: &Point, own: &[f64], contraction: f64) -> f64 {
@@ -117,6 +138,11 @@ impl Effect for Creep {
         }
         if self.pull_amplitude != 0.0 {
             all.push(format!("the pull of the pressure grows by {}", one(self.pull_amplitude, self.time_1)));
+        }
+        for (stiffness, time) in [(self.relaxing_stiffness_1, self.time_1), (self.relaxing_stiffness_2, self.time_2)] {
+            if stiffness != 0.0 {
+                all.push(format!("a stiffness of {:.2} N/mm relaxes within {time:.1} s", 1e-3 * stiffness));
+            }
         }
         format!("The membrane creeps: {}.", all.join(", and "))
     }

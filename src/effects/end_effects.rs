@@ -7,8 +7,8 @@ crate::variables::variables! {
     /// Ends that are no cylinder: the middle of the muscle contracts more than the whole.
     ///
     /// # Model
-    /// The braid feels k x in place of the contraction x, k = 1 + c + a exp(−p/1 bar): `excess` c,
-    /// `low_pressure_excess` a.
+    /// The braid feels k x in place of the contraction x, k = 1 + (c + a exp(−p/1 bar)) (1 + g (x/0.1 m − 1)): `excess` c,
+    /// `low_pressure_excess` a, `growth` g.
     ///
     /// # In the data
     /// The force residual grows with the contraction and with pressure; with the rest length it shrinks.
@@ -24,6 +24,8 @@ crate::variables::variables! {
         excess: f64 = 0.0, ONE, (-0.5..=1.0);
         /// By how much more it counts without pressure
         low_pressure_excess: f64 = 0.0, ONE, (-0.5..=1.0);
+        /// Relative growth of both from 0.1 m to 0.2 m of contraction
+        growth: f64 = 0.0, ONE, (-1.0..=1.0);
     }
 }
 
@@ -31,14 +33,14 @@ impl Effect for EndEffects {
     const DESCRIPTION: Description = Description {
         name: "end_effects",
         meaning: "the ends are no cylinder: the contraction counts k times",
-        equation: "x <- x (1 + c + a exp(-p/1 bar))",
+        equation: "x <- x (1 + (c + a exp(-p/1 bar)) (1 + g (x/0.1 m - 1)))",
         signature: "force residual grows with contraction and pressure",
         experiment: "compare two rest lengths",
         reference: "Tondu and Lopez 2000; Kothera et al. 2009",
         of_load: false,
         exact: false,
         forms: &[&[("end_effects.excess", &[0.1])]],
-        refinements: &[("end_effects.low_pressure_excess", &[0.05])],
+        refinements: &[("end_effects.low_pressure_excess", &[0.05]), ("end_effects.growth", &[0.3])],
     };
 
     fn is_neutral(&self) -> bool {
@@ -49,6 +51,9 @@ impl Effect for EndEffects {
         let mut excess = self.excess;
         if self.low_pressure_excess != 0.0 {
             excess += self.low_pressure_excess * (-at.gauge_pressure / FADE).exp();
+        }
+        if self.growth != 0.0 {
+            excess *= 1.0 + self.growth * (at.relative_contraction() - 1.0);
         }
         contraction + excess * at.contraction
     }

@@ -21,7 +21,8 @@ crate::variables::variables! {
     /// is faster than nominal, unlike with a lower gain of the valve.
     ///
     /// # Validity
-    /// Isothermal; the volume of a short muscle is taken as linear in the contraction.
+    /// Isothermal; the volume of a short muscle is taken as linear in the contraction. e is 0.5 for turbulent flow through a wide gap and
+    /// up to 2 for laminar flow through a narrow one.
     ///
     /// # Reference
     /// ISO 6358-1:2013 (ellipse of the flow through an orifice).
@@ -31,7 +32,7 @@ crate::variables::variables! {
         /// Share of the leak that is a hole, with flow in proportion to absolute pressure
         choked_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Power of the pressure in what is lost through a porous wall, 1 at 2 bar
-        exponent: f64 = 1.0, ONE, (0.3..=3.0);
+        exponent: f64 = 1.0, ONE, (0.5..=3.0);
         /// Gauge pressure up to which a seal is tight
         opening_pressure: f64 = 0.0, PASCAL, (0.0..=3e5);
         /// Relative growth of the volume at 0.1 m of contraction

@@ -134,9 +134,9 @@ pub trait Effect: Declared + Default {
     fn slack(&self) -> Slack {
         Slack::default()
     }
-    /// Time in s by which the valve sees its command late.
-    fn command_delay(&self) -> f64 {
-        0.0
+    /// Times in s by which the valve sees its command late, one that rises and one that falls.
+    fn command_delays(&self) -> [f64; 2] {
+        [0.0; 2]
     }
     /// Command in V on which the valve acts; the pressures that it asks for are not known yet.
     fn command(&self, _at: &Point, _own: &[f64], command: f64) -> f64 {
@@ -304,10 +304,22 @@ macro_rules! effects {
                 all
             }
 
-            /// Time in s by which the valve sees its command late.
+            /// Times in s by which the valve sees its command late, one that rises and one that falls.
+            #[inline]
+            pub fn command_delays(&self) -> [f64; 2] {
+                let mut all = [0.0; 2];
+                $(
+                    let [rising, falling] = self.$field.command_delays();
+                    all = [all[0] + rising, all[1] + falling];
+                )*
+                all
+            }
+
+            /// The longer of both.
             #[inline]
             pub fn command_delay(&self) -> f64 {
-                0.0 $(+ self.$field.command_delay())*
+                let [rising, falling] = self.command_delays();
+                rising.max(falling)
             }
 
             /// Time in s by which the position sensor is late.

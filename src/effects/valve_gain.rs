@@ -7,14 +7,14 @@ crate::variables::variables! {
     /// A valve whose calibration is off: pressure per volt.
     ///
     /// # Model
-    /// u ← u (1 + g + b (u − 2 V)): `relative_error` g, `bend` b of the characteristic.
+    /// u ← u (1 + g + b (u − 2 V)) + s max(u − u_k, 0): `relative_error` g, `bend` b of the characteristic, `slope_change` s above `knee` u_k.
     ///
     /// # In the data
     /// At rest the pressure residual is in proportion to the command. An offset of the valve is constant; a gain of the
     /// pressure sensor does the same to the pressure but leaves the force alone.
     ///
     /// # Validity
-    /// Slightly bent characteristics: |b| up to 5 % per volt.
+    /// Slightly bent characteristics: |b| up to 5 % per volt; ranges that were adjusted apart by up to 10 %.
     ///
     /// # Reference
     /// Linearity errors in data sheets of proportional pressure regulators (1 to 3 % of full scale).
@@ -23,6 +23,10 @@ crate::variables::variables! {
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Change of the gain per volt away from 2 V
         bend: f64 = 0.0, PER_VOLT, (-0.05..=0.05);
+        /// By how much the gain changes at the knee
+        slope_change: f64 = 0.0, ONE, (-0.1..=0.1);
+        /// Command from which on the gain is another one
+        knee: f64 = 2.0, VOLT, (0.2..=9.0);
     }
 }
 
@@ -30,22 +34,30 @@ impl Effect for ValveGain {
     const DESCRIPTION: Description = Description {
         name: "valve_gain",
         meaning: "the valve gives more or less pressure per volt than nominal",
-        equation: "u <- u (1 + g + b (u - 2 V))",
+        equation: "u <- u (1 + g + b (u - 2 V)) + s max(u - u_k, 0)",
         signature: "pressure residual at rest in proportion to the command",
         experiment: "stairs of the command with the pressure recorded by a second sensor",
         reference: "definition",
         of_load: false,
         exact: true,
-        forms: &[&[("valve_gain.relative_error", &[0.05, -0.05])]],
+        forms: &[
+            &[("valve_gain.relative_error", &[0.05, -0.05])],
+            &[
+                ("valve_gain.relative_error", &[0.05]),
+                ("valve_gain.slope_change", &[-0.04]),
+                ("valve_gain.knee", &[1.2, 1.8, 2.6]),
+            ],
+        ],
         refinements: &[("valve_gain.bend", &[0.003])],
     };
 
     fn is_neutral(&self) -> bool {
-        self.relative_error == 0.0 && self.bend == 0.0
+        self.relative_error == 0.0 && self.bend == 0.0 && self.slope_change == 0.0
     }
 
     fn command(&self, _at: &Point, _own: &[f64], command: f64) -> f64 {
-        command * (1.0 + self.relative_error + self.bend * (command - MIDDLE))
+        let bent = command * (1.0 + self.relative_error + self.bend * (command - MIDDLE));
+        bent + self.slope_change * (command - self.knee).max(0.0)
     }
 
     fn sentence(&self) -> String {

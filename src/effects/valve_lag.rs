@@ -10,8 +10,8 @@ crate::variables::variables! {
     /// A valve that follows more slowly than nominal.
     ///
     /// # Model
-    /// 1/ω ← 1/ω + τ (1 + g (p/p₀ − 1)), times 1 + e while emptying: `time_constant` τ at p₀ = 2 bar, its
-    /// `growth_with_pressure` g, `emptying_excess` e. A hose or pilot stage before the valve is a pole of its own:
+    /// 1/ω ← 1/ω + τ (1 + g (p/p₀ − 1) + h x/0.1 m), times 1 + e while emptying: `time_constant` τ of a long muscle at p₀ = 2 bar, its
+    /// `growth_with_pressure` g and, with the volume, `growth_with_contraction` h, `emptying_excess` e. A hose or pilot stage before the valve is a pole of its own:
     /// τ₂ dq/dt = p_target − q, and the valve goes for q: `second_time_constant` τ₂; with both, one after the other,
     /// `third_time_constant` τ₃.
     ///
@@ -33,6 +33,8 @@ crate::variables::variables! {
         third_time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
         /// Relative change of the additional time constant from 0 to 2 bar
         growth_with_pressure: f64 = 0.0, ONE, (-0.9..=3.0);
+        /// Relative change of the additional time constant from 0 to 0.1 m of contraction
+        growth_with_contraction: f64 = 0.0, ONE, (-0.9..=5.0);
         /// Relative excess of the additional time constant while emptying
         emptying_excess: f64 = 0.0, ONE, (-0.9..=5.0);
     }
@@ -42,7 +44,7 @@ impl Effect for ValveLag {
     const DESCRIPTION: Description = Description {
         name: "valve_lag",
         meaning: "the valve is slower than nominal",
-        equation: "1/w <- 1/w + tau (1 + g (p/p0 - 1));  tau2 dq/dt = p_target - q;  tau3 dr/dt = q - r",
+        equation: "1/w <- 1/w + tau (1 + g (p/p0 - 1) + h x/0.1 m);  tau2 dq/dt = p_target - q;  tau3 dr/dt = q - r",
         signature: "pressure residual in proportion to the rate of pressure, gone when slow",
         experiment: "steps of several sizes with pressure recorded",
         reference: "thesis eq. 5.3",
@@ -55,6 +57,7 @@ impl Effect for ValveLag {
             ("valve_lag.third_time_constant", &[0.02]),
             ("valve_lag.growth_with_pressure", &[0.2, -0.2]),
             ("valve_lag.emptying_excess", &[0.2]),
+            ("valve_lag.growth_with_contraction", &[0.3]),
         ],
     };
     const STATE_SCALES: &'static [f64] = &[1e5, 1e5];
@@ -89,7 +92,9 @@ impl Effect for ValveLag {
         if self.time_constant == 0.0 {
             return bandwidth; // 1/(1/w) need not be w to the last bit
         }
-        let growth = (1.0 + self.growth_with_pressure * (at.relative_pressure() - 1.0)).max(LEAST_SHARE);
+        let with_pressure = self.growth_with_pressure * (at.relative_pressure() - 1.0);
+        let with_contraction = self.growth_with_contraction * at.relative_contraction();
+        let growth = (1.0 + with_pressure + with_contraction).max(LEAST_SHARE);
         let emptying = if at.target_pressure < at.gauge_pressure { 1.0 + self.emptying_excess } else { 1.0 };
         1.0 / (1.0 / bandwidth + self.time_constant * growth * emptying)
     }

@@ -98,6 +98,21 @@ class PullCreep(Plant):
         return super().static_force(pressure, x, own) + 0.2 * (own[0] - self.at_start)
 
 
+class Relaxation(Plant):
+    """Springs to points that follow the muscle's end as dashpots let them: a standard linear solid of two times."""
+
+    own_scales = 0.1, 0.1
+
+    def own_start(self, x):
+        return [x, x]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(x - own[0]) / 1.5, (x - own[1]) / 8.0]
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x, own) - 1500.0 * (x - own[0]) - 600.0 * (x - own[1])
+
+
 class Resonance(Plant):
     own_scales = (1e6,)
 
@@ -111,6 +126,26 @@ class Resonance(Plant):
         return own[0]
 
 
+class Regulator(Plant):
+    """Proportional and integral; own is the integral part."""
+
+    own_scales = (1e6,)
+
+    def own_start(self, x):
+        return [0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [25.0**2 * (target - pressure)]
+
+    def pressure_rate(self, target, pressure, x, own):
+        return own[0] + 17.5 * (target - pressure)
+
+
+class SlowerWhenShort(Plant):
+    def pressure_rate(self, target, pressure, x, own):
+        return (target - pressure) / (1 / VALVE_BANDWIDTH + 0.03 * (1 + 7 * x))
+
+
 class DeadTime(Plant):
     DELAY = 0.0373
 
@@ -119,6 +154,30 @@ class DeadTime(Plant):
         end, first = pieces[-1][1], command[0]
         late = [(t0 + self.DELAY, min(t1 + self.DELAY, end), u, s) for t0, t1, u, s in pieces if t0 + self.DELAY < end]
         return [(0.0, self.DELAY, first, 0.0), *late]
+
+
+class UnevenDeadTime(Plant):
+    """Falling commands come later: of the command as it was at two times the larger counts."""
+
+    DELAYS = 0.0373, 0.05595
+
+    def seen(self, command):
+        pieces = super().seen(command)
+        times = np.array([0.0, *(t1 for _, t1, _, _ in pieces)])
+        late = lambda t: [np.interp(t - delay, times, command) for delay in self.DELAYS]
+        cuts = sorted({*times, *(t + d for t in times for d in self.DELAYS if t + d < times[-1])})
+        cuts = [a for a, b in zip(cuts[:-1], cuts[1:]) if b - a > 1e-12] + [times[-1]]
+        result = []
+        for a, b in zip(cuts[:-1], cuts[1:]):
+            (one_a, other_a), (one_b, other_b) = late(a), late(b)
+            ahead_a, ahead_b = one_a - other_a, one_b - other_b
+            middle = a + (b - a) * ahead_a / (ahead_a - ahead_b) if ahead_a * ahead_b < 0 else b
+            for start, end in ((a, middle), (middle, b)):
+                if end > start:
+                    which = int(np.argmax(late((start + end) / 2)))
+                    u0, u1 = (late(t)[which] for t in (start, end))
+                    result.append((start, end, u0, (u1 - u0) / (end - start)))
+        return result
 
 
 class Play(Plant):
@@ -242,6 +301,10 @@ CASES = [
     Case("creep", Creep(), STAIRS),
     Case("uneven_creep", UnevenCreep(), STAIRS),
     Case("pull_creep", PullCreep(), STAIRS),
+    Case("relaxation", Relaxation(), STAIRS),
+    Case("regulator", Regulator(), STAIRS),
+    Case("slower_when_short", SlowerWhenShort(), STAIRS),
+    Case("uneven_dead_time", UnevenDeadTime(), RAMPS),
     Case("resonance", Resonance(), STAIRS),
     Case("dead_time", DeadTime(), RAMPS),
     Case("play", Play(), RAMPS),
