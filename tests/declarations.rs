@@ -288,6 +288,7 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
         ("leakage.volume_growth", 0.5),
         ("leakage.opening_pressure", 0.5e5),
         ("end_effects.growth", 0.5),
+        ("bladder_stiffness.added_growth", 0.5),
         ("valve_gain.knee", 1.0),
         ("valve_dead_time.falling_excess", 0.5),
         ("valve_lag.growth_with_contraction", 0.5),

@@ -247,6 +247,9 @@ pub fn corrections(nominal: &Parameters, tolerance: f64, off: Off) -> Vec<(&'sta
     relative.chain(shapes).collect()
 }
 
+/// Change of the residuals per unit of each correction.
+pub type Slopes = Vec<Vec<f64>>;
+
 /// What fits of all hypotheses have in common.
 pub struct Bench<'a> {
     /// The recordings.
@@ -254,8 +257,8 @@ pub struct Bench<'a> {
     nominal: &'a Parameters,
     /// Corrections with their bounds and priors.
     corrections: Vec<(&'static Variable, Free)>,
-    /// Change of the residuals per unit of each correction; empty before the baseline is known.
-    slopes: Vec<Vec<f64>>,
+    /// At the baseline; empty before it is known.
+    slopes: Slopes,
     weights: Vec<f64>,
 }
 
@@ -288,7 +291,17 @@ impl<'a> Bench<'a> {
     ///
     /// `None` where the start cannot be simulated.
     pub fn rough_fit(&self, hypothesis: &Hypothesis, start: &Parameters) -> Option<Fitted> {
-        self.fit(hypothesis, start, Scope::All, &self.slopes, ROUGH)
+        self.rough_fit_with(&self.slopes, hypothesis, start)
+    }
+
+    /// The same with slopes from nearby.
+    pub fn rough_fit_with(&self, slopes: &Slopes, hypothesis: &Hypothesis, start: &Parameters) -> Option<Fitted> {
+        self.fit(hypothesis, start, Scope::All, slopes, ROUGH)
+    }
+
+    /// Slopes at a fit.
+    pub fn slopes_of(&self, fitted: &Fitted) -> Slopes {
+        self.slopes_at(&fitted.parameters, &fitted.residuals)
     }
 
     /// Fits a hypothesis to the end on the samples in scope, starting from a model that is about right. What the
@@ -353,8 +366,7 @@ impl<'a> Bench<'a> {
         Some(self.fitted(hypothesis, parameters, self.data.residuals(&parameters)?))
     }
 
-    /// Change of the residuals per unit of each correction at a model.
-    fn slopes_at(&self, model: &Parameters, residuals: &[f64]) -> Vec<Vec<f64>> {
+    fn slopes_at(&self, model: &Parameters, residuals: &[f64]) -> Slopes {
         let (variables, free): (Vec<_>, Vec<_>) = self.corrections.iter().copied().unzip();
         let at: Vec<f64> = variables.iter().map(|variable| declared(model, variable.name).1).collect();
         derivatives(

@@ -1,7 +1,7 @@
 //! Which causes are named, if any: forward selection over a beam of hypotheses, with refusal in both directions.
 
 use super::Verdict;
-use super::candidates::{Bench, Fitted, Part, Refined, Start, has_many_minima, neutralised};
+use super::candidates::{Bench, Fitted, Part, Refined, Slopes, Start, has_many_minima, neutralised};
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
@@ -289,18 +289,19 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     fn part_refined(&self, judged: Judged, which: usize) -> Judged {
-        let nothing_left = beyond_noise(&judged.fitted.losses).values().all(|left| *left <= NEGLIGIBLE);
         let part = judged.fitted.hypothesis.parts[which];
-        if nothing_left || part.refined != Refined::Not {
+        if part.refined != Refined::Not {
             return judged;
         }
+        // What hangs on details hangs on what the corrections do here, too.
+        let slopes = self.bench.slopes_of(&judged.fitted);
         let each = (0..part.effect.refinements.len()).map(Refined::By);
-        let refined = each.chain([Refined::Fully]).collect::<Vec<_>>().into_par_iter();
-        let better = refined.filter_map(|refined| self.refined_by(&judged, which, refined));
+        let ways = [Refined::Not, Refined::Fully].into_iter().chain(each).collect::<Vec<_>>().into_par_iter();
+        let better = ways.filter_map(|refined| self.refined_by(&judged, which, refined, &slopes));
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
-    fn refined_by(&self, judged: &Judged, which: usize, refined: Refined) -> Option<Judged> {
+    fn refined_by(&self, judged: &Judged, which: usize, refined: Refined, slopes: &Slopes) -> Option<Judged> {
         let mut hypothesis = judged.fitted.hypothesis.clone();
         let part = &mut hypothesis.parts[which];
         let known: Vec<&str> = part.freed().map(|(name, _)| *name).collect();
@@ -309,7 +310,7 @@ impl<'a, 'b> Search<'a, 'b> {
         for (name, values) in part.freed().filter(|(name, _)| !known.contains(name)) {
             start.set(name, values[0]).ok()?;
         }
-        Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
+        Some(self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &start)?))
     }
 
     /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect.
@@ -502,7 +503,9 @@ impl<'a, 'b> Search<'a, 'b> {
             [&self.baseline, &best.fitted, &other.fitted].map(|fitted| beyond_noise(&fitted.losses));
         before.into_iter().all(|(signal, before)| {
             let alike = ALSO_BY_FORM * of_best[&signal];
-            of_other[&signal] <= NEGLIGIBLE.max(alike.min(left_by_form(before)))
+            // A sound model may have its structural error, too, and then that decides.
+            let structure = self.bench.data.structure(signal).min(LEFT_BY_FORM * before);
+            of_other[&signal] <= NEGLIGIBLE.max(structure).max(alike.min(left_by_form(before)))
         })
     }
 }

@@ -4,7 +4,8 @@ crate::variables::variables! {
     /// A membrane that is stiffer or softer than nominal.
     ///
     /// # Model
-    /// F_e ← F_e (1 + c + c₁ x/0.1 m): `relative_change` c, `change_with_contraction` c₁.
+    /// F_e ← F_e (1 + c + c₁ x/0.1 m) − f s (1 + g (s − 1)), s = x/0.1 m: `relative_change` c, `change_with_contraction` c₁. What a tube
+    /// of rubber beside the nominal one pulls back begins with zero: `added_force` f, `added_growth` g.
     ///
     /// # In the data
     /// The force residual is a single-valued function of the contraction, the same at every pressure, also at none. A
@@ -14,12 +15,16 @@ crate::variables::variables! {
     /// ± 35 % are usual between specimens and with age.
     ///
     /// # Reference
-    /// Thesis eqs. 4.5 and 4.17 (elastic term).
+    /// Thesis eqs. 4.5 and 4.17 (elastic term); second order in the contraction of what a neo-Hookean, Gent or Fung tube adds.
     pub struct BladderStiffness in "bladder_stiffness." as Tunable {
         /// Relative change of the elastic force
         relative_change: f64 = 0.0, ONE, (-0.9..=1.0);
         /// Further relative change at 0.1 m of contraction
         change_with_contraction: f64 = 0.0, ONE, (-0.9..=0.9);
+        /// Force beside the nominal one with which the membrane pulls back at 0.1 m of contraction
+        added_force: f64 = 0.0, NEWTON, (-500.0..=500.0);
+        /// Relative growth of its stiffness from 0.1 m to 0.2 m
+        added_growth: f64 = 0.0, ONE, (-0.5..=1.5);
     }
 }
 
@@ -27,27 +32,39 @@ impl Effect for BladderStiffness {
     const DESCRIPTION: Description = Description {
         name: "bladder_stiffness",
         meaning: "the passive elastic force differs from nominal",
-        equation: "F_e <- F_e (1 + c + c1 x/0.1 m)",
+        equation: "F_e <- F_e (1 + c + c1 s) - f s (1 + g (s - 1)), s = x/0.1 m",
         signature: "force residual depends on contraction alone, also at zero pressure",
         experiment: "stretch the muscle without pressure; the same motion at two constant pressures",
         reference: "thesis eqs. 4.5, 4.17",
         of_load: false,
         exact: false,
-        forms: &[&[("bladder_stiffness.relative_change", &[0.15, -0.15])]],
+        forms: &[
+            &[("bladder_stiffness.relative_change", &[0.15, -0.15])],
+            &[("bladder_stiffness.added_force", &[60.0, -60.0]), ("bladder_stiffness.added_growth", &[0.3])],
+        ],
         refinements: &[("bladder_stiffness.change_with_contraction", &[0.1])],
     };
 
     fn is_neutral(&self) -> bool {
-        self.relative_change == 0.0 && self.change_with_contraction == 0.0
+        [self.relative_change, self.change_with_contraction, self.added_force] == [0.0; 3]
     }
 
     fn elastic_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
-        force * (1.0 + self.relative_change + self.change_with_contraction * at.relative_contraction())
+        let s = at.relative_contraction();
+        let added = self.added_force * s * (1.0 + self.added_growth * (s - 1.0));
+        force * (1.0 + self.relative_change + self.change_with_contraction * s) - added
     }
 
     fn sentence(&self) -> String {
         let change = 100.0 * (self.relative_change + self.change_with_contraction);
-        let word = if change < 0.0 { "softer" } else { "stiffer" };
-        format!("The membrane is {:.0} % {word} than nominal at 10 cm of contraction.", change.abs())
+        let word = |change: f64| if change < 0.0 { "softer" } else { "stiffer" };
+        let percent = format!("{:.0} % {} than nominal", change.abs(), word(change));
+        let newtons = format!("{:.0} N {}", self.added_force.abs(), word(self.added_force));
+        let how = match (change, self.added_force) {
+            (_, 0.0) => percent,
+            (0.0, _) => newtons,
+            _ => format!("{percent} and {newtons}"),
+        };
+        format!("The membrane is {how} at 10 cm of contraction.")
     }
 }
