@@ -93,6 +93,16 @@ impl Part {
         form.iter().chain(refinements.iter().filter(|(name, _)| form.iter().all(|(known, _)| known != name)))
     }
 
+    /// A model with its refinements at their neutral defaults.
+    pub fn unrefined(self, model: &Parameters) -> Parameters {
+        let form = self.effect.forms[self.form];
+        let refinements = self.freed().filter(|(name, _)| form.iter().all(|(known, _)| known != name));
+        refinements.fold(*model, |model, (name, _)| {
+            let (variable, neutral) = declared(&Parameters::default(), name);
+            with_values(&model, &[variable], &[neutral])
+        })
+    }
+
     /// How many starts its form has.
     fn starts(self) -> usize {
         self.freed().map(|(_, starts)| starts.len()).max().unwrap_or(0)

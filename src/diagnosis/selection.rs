@@ -1,7 +1,7 @@
 //! Which causes are named, if any: forward selection over a beam of hypotheses, with refusal in both directions.
 
 use super::Verdict;
-use super::candidates::{Bench, Fitted, Part, Refined, Slopes, Start, has_many_minima, neutralised};
+use super::candidates::{Bench, Fitted, Hypothesis, Part, Refined, Slopes, Start, has_many_minima, neutralised};
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
@@ -442,15 +442,16 @@ impl<'a, 'b> Search<'a, 'b> {
         if best.explained < least_explained(&best.fitted).0 {
             return refused(wrong);
         }
-        let model = self.bench.exact_fit(&best.fitted.hypothesis, &best.fitted.parameters, Scope::Training)?;
+        let told = self.simplest(&best);
+        let model = self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, Scope::Training)?;
         if model.hypothesis.is_impossible(&model.parameters) {
             return refused(wrong);
         }
         let holds_out = self.holds(&model)?;
-        if !(holds_out || self.is_as_good_in_training(&best.fitted, &model) && self.holds(&best.fitted)?) {
+        if !(holds_out || self.is_as_good_in_training(&told.fitted, &model) && self.holds(&told.fitted)?) {
             return refused(wrong);
         }
-        let model = if holds_out { model } else { best.fitted.clone() };
+        let model = if holds_out { model } else { told.fitted };
         let rivals = self.rivals(&best, &levels[best.fitted.hypothesis.parts.len() - 1]);
         let alternatives: Vec<Vec<&'static str>> =
             best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
@@ -463,6 +464,17 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
         Some(Chosen { verdict, model, saw_all: !holds_out, alternatives, rivals, singles })
+    }
+
+    /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
+    fn simplest(&self, judged: &Judged) -> Judged {
+        let fitted = &judged.fitted;
+        let start = fitted.hypothesis.parts.iter().fold(fitted.parameters, |start, part| part.unrefined(&start));
+        let parts = fitted.hypothesis.parts.iter().map(|part| Part { refined: Refined::Not, ..*part }).collect();
+        let plain = self.bench.exact_fit(&Hypothesis { parts }, &start, Scope::All).map(|fitted| self.judge(fitted));
+        let leaves_nothing =
+            |plain: &Judged| beyond_noise(&plain.fitted.losses).values().all(|left| *left <= NEGLIGIBLE);
+        plain.filter(leaves_nothing).unwrap_or_else(|| judged.clone())
     }
 
     /// Whether the first samples cannot tell a fit from their own best.

@@ -34,7 +34,7 @@ crate::variables::variables! {
         /// Power of the pressure in what is lost through a porous wall, 1 at 2 bar
         exponent: f64 = 1.0, ONE, (0.5..=3.0);
         /// Gauge pressure up to which a seal is tight
-        opening_pressure: f64 = 0.0, PASCAL, (0.0..=3e5);
+        opening_pressure: f64 = 0.0, PASCAL, (0.0..=1e5);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
     }
