@@ -1,11 +1,13 @@
 //! Bounded nonlinear least squares.
 //!
 //! # Model
-//! Levenberg–Marquardt on Σ r², each step the minimum of the damped quadratic within the bounds. Derivatives are forward differences, taken in parallel; those of parameters that act almost linearly
-//! may be given and cost nothing then. A prior counts as one more residual.
+//! Levenberg–Marquardt on Σ r², each step the minimum of the damped quadratic within the bounds. Derivatives are forward
+//! differences, taken in parallel; those of parameters that act almost linearly may be given and cost nothing then. A
+//! prior counts as one more residual.
 //!
 //! # Reference
-//! D. Marquardt (1963), doi 10.1137/0111030; bounds as in [`bounded_minimum`]. Own code because `levenberg-marquardt` 0.15 has no bounds.
+//! D. Marquardt (1963), doi 10.1137/0111030; bounds by active sets, as in J. Nocedal, S. Wright (2006), Numerical
+//! Optimization, algorithm 16.3. Own code because `levenberg-marquardt` 0.15 has no bounds.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -261,8 +263,7 @@ fn damped(normal: &DMatrix<f64>, share: f64) -> DMatrix<f64> {
 /// Minimum of gᵀs + sᵀHs/2 for a positive definite H, with s within bounds that hold zero; zero where H is not.
 ///
 /// Active sets: the minimum over the components that are not held is gone for until one meets its bound, which is then
-/// held; at such a minimum the one that is held against the steepest descent is let go (J. Nocedal, S. Wright (2006),
-/// Numerical Optimization, algorithm 16.3).
+/// held; at such a minimum the one that is held against the steepest descent is let go.
 fn bounded_minimum(matrix: &DMatrix<f64>, gradient: &DVector<f64>, bounds: &[(f64, f64)]) -> DVector<f64> {
     let count = bounds.len();
     let mut at = DVector::zeros(count);

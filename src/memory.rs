@@ -322,6 +322,9 @@ impl PlantMemory {
         if self.command.is_empty() {
             return None;
         }
+        if rising == falling {
+            return Some(self.command.look_up(time - rising));
+        }
         let [one, other] = [rising, falling].map(|delay| self.command.look_up(time - delay));
         // Which of the two leads tells the direction; they change places where their lines cross.
         let ahead = (one.0 - other.0, one.1 - other.1);

@@ -84,23 +84,25 @@ pub struct Part {
 impl Part {
     /// The free parameters; a refinement that the form has already is not counted twice.
     pub fn freed(self) -> impl Iterator<Item = &'static Freed> {
+        self.effect.forms[self.form].iter().chain(self.refinements())
+    }
+
+    fn refinements(self) -> impl Iterator<Item = &'static Freed> {
         let form = self.effect.forms[self.form];
         let refinements = match self.refined {
             Refined::Not => &[],
             Refined::By(which) => &self.effect.refinements[which..=which],
             Refined::Fully => self.effect.refinements,
         };
-        form.iter().chain(refinements.iter().filter(|(name, _)| form.iter().all(|(known, _)| known != name)))
+        refinements.iter().filter(|(name, _)| form.iter().all(|(known, _)| known != name))
     }
 
     /// A model with its refinements at their neutral defaults.
     pub fn unrefined(self, model: &Parameters) -> Parameters {
-        let form = self.effect.forms[self.form];
-        let refinements = self.freed().filter(|(name, _)| form.iter().all(|(known, _)| known != name));
-        refinements.fold(*model, |model, (name, _)| {
-            let (variable, neutral) = declared(&Parameters::default(), name);
-            with_values(&model, &[variable], &[neutral])
-        })
+        let default = Parameters::default();
+        let (variables, neutral): (Vec<_>, Vec<_>) =
+            self.refinements().map(|(name, _)| declared(&default, name)).unzip();
+        with_values(model, &variables, &neutral)
     }
 
     /// How many starts its form has.

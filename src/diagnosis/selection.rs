@@ -109,13 +109,20 @@ fn left_by_form(before: f64) -> f64 {
     NEGLIGIBLE.max(LEFT_BY_FORM * before)
 }
 
-fn total(beyond_noise: &BTreeMap<Signal, f64>) -> f64 {
-    beyond_noise.values().sum()
-}
-
 /// What is left beyond noise and the structural error that a sound model may have.
 fn unsound(left: &BTreeMap<Signal, f64>, data: &Data) -> f64 {
     left.iter().map(|(signal, left)| (left - NEGLIGIBLE - data.structure(*signal)).max(0.0)).sum()
+}
+
+/// Share of the error beyond noise that goes away.
+fn explained(without: &[Loss], with: &[Loss], data: &Data) -> f64 {
+    let before: f64 = beyond_noise(without).values().sum();
+    1.0 - unsound(&beyond_noise(with), data) / before.max(f64::MIN_POSITIVE)
+}
+
+/// Whether nothing beyond noise is left that is worth a look.
+fn is_negligible(losses: &[Loss]) -> bool {
+    beyond_noise(losses).values().all(|left| *left <= NEGLIGIBLE)
 }
 
 impl Chosen {
@@ -153,8 +160,7 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn judge(&self, fitted: Fitted) -> Judged {
         let evidence = evidence(&self.baseline, &fitted);
-        let (before, after) = (beyond_noise(&self.baseline.losses), beyond_noise(&fitted.losses));
-        let explained = 1.0 - unsound(&after, &self.bench.data) / total(&before).max(f64::MIN_POSITIVE);
+        let explained = explained(&self.baseline.losses, &fitted.losses, &self.bench.data);
         let score = self.bench.data.log_likelihood(&fitted.losses)
             - 0.5 * fitted.hypothesis.size() as f64 * (fitted.residuals.len() as f64).ln();
         Judged { fitted, evidence, score, explained }
@@ -468,13 +474,15 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
     fn simplest(&self, judged: &Judged) -> Judged {
-        let fitted = &judged.fitted;
-        let start = fitted.hypothesis.parts.iter().fold(fitted.parameters, |start, part| part.unrefined(&start));
-        let parts = fitted.hypothesis.parts.iter().map(|part| Part { refined: Refined::Not, ..*part }).collect();
-        let plain = self.bench.exact_fit(&Hypothesis { parts }, &start, Scope::All).map(|fitted| self.judge(fitted));
-        let leaves_nothing =
-            |plain: &Judged| beyond_noise(&plain.fitted.losses).values().all(|left| *left <= NEGLIGIBLE);
-        plain.filter(leaves_nothing).unwrap_or_else(|| judged.clone())
+        let Fitted { hypothesis: Hypothesis { parts }, parameters, .. } = &judged.fitted;
+        if parts.iter().all(|part| part.refined == Refined::Not) {
+            return judged.clone();
+        }
+        let start = parts.iter().fold(*parameters, |start, part| part.unrefined(&start));
+        let parts = parts.iter().map(|part| Part { refined: Refined::Not, ..*part }).collect();
+        let plain = self.bench.exact_fit(&Hypothesis { parts }, &start, Scope::All);
+        let plain = plain.filter(|fitted| is_negligible(&fitted.losses)).map(|fitted| self.judge(fitted));
+        plain.unwrap_or_else(|| judged.clone())
     }
 
     /// Whether the first samples cannot tell a fit from their own best.
@@ -492,8 +500,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let baseline = self.bench.exact_fit(hypothesis, parameters, Scope::Training)?;
         let unseen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, Scope::HeldOut);
         let (without, with) = (unseen(&baseline), unseen(trained));
-        let (before, after) = (beyond_noise(&without), beyond_noise(&with));
-        let explained = 1.0 - unsound(&after, &self.bench.data) / total(&before).max(f64::MIN_POSITIVE);
+        let explained = explained(&without, &with, &self.bench.data);
         Some(gain(&without, &with) > 0.0 && explained > least_explained(trained).1)
     }
 
