@@ -83,6 +83,16 @@ impl Piece {
         let [_, b, c, d] = self.coefficients;
         b + after * (2.0 * c + after * 3.0 * d)
     }
+
+    /// Integral between two times.
+    fn integral(&self, from: f64, to: f64) -> f64 {
+        let [a, b, c, d] = self.coefficients;
+        let until = |time: f64| {
+            let after = time - self.start;
+            after * (a + after * (b / 2.0 + after * (c / 3.0 + after * d / 4.0)))
+        };
+        until(to) - until(from)
+    }
 }
 
 /// The past of one signal.
@@ -158,6 +168,18 @@ impl History {
             let after = (time - piece.start).max(0.0);
             (piece.at(after), piece.slope(after), lasts)
         })
+    }
+
+    /// Mean between two times, the value there where they are the same; zero where nothing is remembered.
+    fn mean(&self, from: f64, to: f64) -> f64 {
+        if to - from <= SAME_INSTANT {
+            return self.look_up(to).0;
+        }
+        let first = self.pieces.partition_point(|piece| piece.start <= from).saturating_sub(1);
+        let ends = self.pieces.iter().skip(first + 1).map(|next| next.start).chain([f64::INFINITY]);
+        let pieces = self.pieces.iter().skip(first).zip(ends).take_while(|(piece, _)| piece.start < to);
+        let integrals = pieces.map(|(piece, end)| piece.integral(piece.start.max(from), end.min(to)));
+        integrals.sum::<f64>() / (to - from)
     }
 
     fn save(&self, saved: &mut Vec<f64>) {
@@ -340,9 +362,9 @@ impl PlantMemory {
         &mut self.contraction
     }
 
-    /// Contraction in m at a time in s; `None` where it is not remembered.
-    pub fn contraction_at(&self, time: f64) -> Option<f64> {
-        (!self.contraction.is_empty()).then(|| self.contraction.look_up(time).0)
+    /// Mean contraction in m between two times in s; `None` where it is not remembered.
+    pub fn mean_contraction(&self, from: f64, to: f64) -> Option<f64> {
+        (!self.contraction.is_empty()).then(|| self.contraction.mean(from, to))
     }
 
     /// Forgets what no delay reaches any more.

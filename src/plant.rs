@@ -398,7 +398,7 @@ fn hanging_point(state: &Extended<3, HANGING_STATES>) -> (Point, &[f64]) {
 #[inline]
 fn readings(parameters: &Parameters, time: f64, at: &Point, force: f64, memory: &PlantMemory) -> Readings {
     let effects = &parameters.effects;
-    let remembered = memory.contraction_at(time - effects.contraction_delay());
+    let remembered = memory.mean_contraction(time - effects.contraction_reach(), time - effects.contraction_delay());
     let contraction = remembered.unwrap_or(at.contraction);
     effects.readings(Readings { time, contraction, gauge_pressure: at.gauge_pressure, force })
 }
@@ -422,7 +422,7 @@ fn expect_command<S: System>(memory: &mut PlantMemory, step: &Step<'_, S>, comma
 
 /// Begins to remember the contraction, in m now, where its sensor is late, and ends where it is not.
 fn expect_contraction<S: System>(memory: &mut PlantMemory, step: &Step<'_, S>, contraction: f64) {
-    match step.parameters.effects.contraction_delay() {
+    match step.parameters.effects.contraction_reach() {
         0.0 => *memory.contraction() = Default::default(),
         _ => memory.contraction().begin(step.time, contraction),
     }
@@ -451,7 +451,7 @@ fn felt<S: System>(
 fn forget(memory: &mut PlantMemory, parameters: &Parameters, time: f64) {
     if !memory.is_empty() {
         let effects = &parameters.effects;
-        memory.forget(time - effects.command_delay(), time - effects.contraction_delay());
+        memory.forget(time - effects.command_delay(), time - effects.contraction_reach());
     }
 }
 

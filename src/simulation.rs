@@ -143,9 +143,9 @@ impl<'a> Motion<'a> {
     fn of(parameters: &'a Parameters, recording: &Recording) -> Self {
         let time = &recording.time;
         let mut readings = recording.bridged(Signal::Contraction).unwrap_or_else(|| vec![0.0; time.len()]);
-        let delay = parameters.effects.contraction_delay();
-        if delay > 0.0 {
-            readings = ahead(time, &readings, delay);
+        let late = parameters.effects.contraction_delay() + 0.5 * parameters.effects.contraction_averaging();
+        if late > 0.0 {
+            readings = ahead(time, &readings, late);
         }
         let since: Vec<f64> = time.iter().map(|now| now - time[0]).collect();
         let unstretched = |(reading, time): (&f64, &f64)| parameters.effects.true_contraction(*reading, 0.0, *time);

@@ -84,6 +84,10 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("slower_when_short", &[("valve_lag.time_constant", 0.03), ("valve_lag.growth_with_contraction", 0.7)]),
+        (
+            "averaged_position",
+            &[("contraction_sensor_delay.delay", 0.03), ("contraction_sensor_delay.averaging", 0.08)],
+        ),
         ("dead_time", &[("valve_dead_time.delay", 0.0373)]),
         ("uneven_dead_time", &[("valve_dead_time.delay", 0.0373), ("valve_dead_time.falling_excess", 0.5)]),
         ("play", &[("valve_dead_band.play", 0.11)]),

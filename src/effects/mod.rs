@@ -192,6 +192,10 @@ pub trait Effect: Declared + Default {
     fn contraction_delay(&self) -> f64 {
         0.0
     }
+    /// Time in s before that over which it averages.
+    fn contraction_averaging(&self) -> f64 {
+        0.0
+    }
     /// What the sensors show.
     fn readings(&self, readings: Readings) -> Readings {
         readings
@@ -326,6 +330,18 @@ macro_rules! effects {
             #[inline]
             pub fn contraction_delay(&self) -> f64 {
                 0.0 $(+ self.$field.contraction_delay())*
+            }
+
+            /// Time in s before that over which it averages.
+            #[inline]
+            pub fn contraction_averaging(&self) -> f64 {
+                0.0 $(+ self.$field.contraction_averaging())*
+            }
+
+            /// Time in s from which on the past of the contraction is not seen any more.
+            #[inline]
+            pub fn contraction_reach(&self) -> f64 {
+                self.contraction_delay() + self.contraction_averaging()
             }
 
             chained! { "Command in V on which the valve acts."; command; $($field: $Effect;)* }

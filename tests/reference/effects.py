@@ -46,7 +46,8 @@ class Plant:
     def force(self, pressure, x, velocity, own):
         return self.static_force(pressure, x, own) - DAMPING * velocity
 
-    def reading(self, x, force):
+    def readings(self, x, force, own):
+        """Of the position sensor at the samples, from all states there."""
         return x
 
 
@@ -156,6 +157,23 @@ class DeadTime(Plant):
         return [(0.0, self.DELAY, first, 0.0), *late]
 
 
+class AveragedPosition(Plant):
+    """The sensor shows the mean of the 80 ms that ended 30 ms ago: a difference of the integral of the contraction."""
+
+    own_scales = (1.0,)
+
+    def own_start(self, x):
+        return [0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [x]
+
+    def readings(self, x, force, own):
+        early = x[0] * SAMPLE_TIME * np.arange(-11, 0)
+        integral = np.concatenate([early, own[:, 0]])
+        return (integral[8:-3] - integral[:-11]) / (8 * SAMPLE_TIME)
+
+
 class UnevenDeadTime(Plant):
     """Falling commands come later: of the command as it was at two times the larger counts."""
 
@@ -249,7 +267,7 @@ class LiftingSeal(Plant):
 
 
 class SeriesElasticity(Plant):
-    def reading(self, x, force):
+    def readings(self, x, force, own):
         return x - 8e-6 * 400 * (force / 400) ** 0.85
 
 
@@ -305,6 +323,7 @@ CASES = [
     Case("regulator", Regulator(), STAIRS),
     Case("slower_when_short", SlowerWhenShort(), STAIRS),
     Case("uneven_dead_time", UnevenDeadTime(), RAMPS),
+    Case("averaged_position", AveragedPosition(), RAMPS),
     Case("resonance", Resonance(), STAIRS),
     Case("dead_time", DeadTime(), RAMPS),
     Case("play", Play(), RAMPS),
@@ -360,12 +379,14 @@ def solve(case):
 
 def main():
     for case in CASES:
-        rows = []
-        for time, command, state in zip(np.arange(len(case.command)) * SAMPLE_TIME, case.command, solve(case)):
+        rows, states = [], solve(case)
+        for time, command, state in zip(np.arange(len(case.command)) * SAMPLE_TIME, case.command, states):
             pressure, x, velocity, *own = state
             assert 0 < x < 0.25, f"{case.name}: contraction {x} m"
             force = case.plant.force(pressure, x, velocity, own)
-            rows.append([time, command, pressure, case.plant.reading(x, force), velocity, force, MASS])
+            rows.append([time, command, pressure, x, velocity, force, MASS])
+        rows = np.array(rows)
+        rows[:, 3] = case.plant.readings(rows[:, 3], rows[:, 5], states[:, 3:])
         path = Path(__file__).parent / f"effect_{case.name}.csv"
         np.savetxt(path, rows, "%.12g", ",", header=HEADER, comments="")
         print(f"{path.name}: {len(rows)} samples")
