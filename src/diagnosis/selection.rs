@@ -19,12 +19,13 @@ const LEAST_EXPLAINED: (f64, f64) = (0.96, 0.9);
 const LEAST_EXPLAINED_EXACTLY: (f64, f64) = (0.995, 0.95);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
 const LEAST_FURTHER: f64 = 0.8;
+/// The same of what is little enough to be the first one's form: a cause of its own leaves next to nothing of it.
+const LEAST_OF_FORM: f64 = 0.9;
 /// The same before the hypothesis is refined: fits of two effects that came to be named began at 0.87 and more.
 const MAY_GO_FURTHER: f64 = 0.5;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
-/// Share of a signal's error that a named effect may leave without a further effect being looked for: a tenth of its
-/// rms is how the form of an effect differs from the true one.
+/// Share of a signal's error that a named effect may leave because its form differs from the true one: a tenth of its rms.
 const LEFT_BY_FORM: f64 = 0.01;
 /// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
 /// in the forms, which are never known exactly.
@@ -114,6 +115,11 @@ fn unsound(left: &BTreeMap<Signal, f64>, data: &Data) -> f64 {
     left.iter().map(|(signal, left)| (left - NEGLIGIBLE - data.structure(*signal)).max(0.0)).sum()
 }
 
+/// Whether more is left of some signal than noise and that.
+fn is_unsound(losses: &[Loss], data: &Data) -> bool {
+    unsound(&beyond_noise(losses), data) > 0.0
+}
+
 /// Share of the error beyond noise that goes away.
 fn explained(without: &[Loss], with: &[Loss], data: &Data) -> f64 {
     let before: f64 = beyond_noise(without).values().sum();
@@ -128,8 +134,7 @@ fn is_negligible(losses: &[Loss]) -> bool {
 impl Chosen {
     /// Whether something is wrong of which the model leaves more than noise.
     pub fn leaves_something(&self, data: &Data) -> bool {
-        let left = beyond_noise(&data.losses(&self.model.residuals, Scope::All));
-        self.verdict != Verdict::Nominal && unsound(&left, data) > 0.0
+        self.verdict != Verdict::Nominal && is_unsound(&data.losses(&self.model.residuals, Scope::All), data)
     }
 
     /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither fit
@@ -246,13 +251,13 @@ impl<'a, 'b> Search<'a, 'b> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
         let Some(best) = others.next().map(|(_, best)| self.led_by(best)) else { return Vec::new() };
-        let is_enough = self.is_enough(&best.fitted.losses);
-        let is_close = |(rank, _): &(usize, Judged)| if is_enough { &rivals } else { &ranks }.contains(rank);
+        let may_be_form = self.may_be_form(&best.fitted.losses);
+        let is_close = |(rank, _): &(usize, Judged)| if may_be_form { &rivals } else { &ranks }.contains(rank);
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
         let refined = close.into_par_iter().map(|(_, judged)| {
             let last = judged.fitted.hypothesis.parts.len() - 1;
-            self.finished(if is_enough { self.refined(judged) } else { self.part_refined(judged, last) })
+            self.finished(if may_be_form { self.refined(judged) } else { self.part_refined(judged, last) })
         });
         sorted(refined.chain([best]).chain(rest).collect())
     }
@@ -267,7 +272,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The hypothesis that leads a level, refined in all its effects and, where that is not enough, in the best form of its last.
     fn led_by(&self, judged: Judged) -> Judged {
         let refined = self.finished(self.refined(judged.clone()));
-        if self.is_enough(&refined.fitted.losses) {
+        if self.may_be_form(&refined.fitted.losses) {
             return refined;
         }
         let other = self.in_other_forms(&judged).map(|other| self.finished(self.refined(other)));
@@ -322,22 +327,30 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect.
     fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
         let leading = self.leading(levels).filter(|best| best.fitted.hypothesis.parts.len() == levels.len());
-        leading.is_some_and(|best| !self.is_enough(&best.fitted.losses)) && !self.is_sound(&self.baseline.losses)
+        leading.is_some_and(|best| is_unsound(&best.fitted.losses, &self.bench.data))
+            && !self.is_sound(&self.baseline.losses)
     }
 
-    /// Whether residuals are small enough that nothing more is looked for.
-    fn is_enough(&self, losses: &[Loss]) -> bool {
+    /// Whether residuals are small enough to be those of forms, which are never known exactly.
+    fn may_be_form(&self, losses: &[Loss]) -> bool {
         let before = beyond_noise(&self.baseline.losses);
         beyond_noise(losses).iter().all(|(signal, left)| *left <= left_by_form(before[signal]))
     }
 
-    /// Share of what a hypothesis leaves that another one explains, in the signals in which it leaves more than forms may.
+    /// Share of what a hypothesis leaves that another one explains, in the signals in which it leaves more than forms may; where
+    /// it leaves no more than that anywhere, in those in which it leaves more than a sound model may.
     fn further(&self, fewer: &Judged, more: &Judged) -> f64 {
         let [before, left, after] =
             [&self.baseline, &fewer.fitted, &more.fitted].map(|fitted| beyond_noise(&fitted.losses));
         let (mut worth, mut still) = (0.0, 0.0);
+        let is_form_alone = self.may_be_form(&fewer.fitted.losses);
         for (signal, left) in left {
-            if left > left_by_form(before[&signal]) {
+            let least = if is_form_alone {
+                NEGLIGIBLE + self.bench.data.structure(signal)
+            } else {
+                left_by_form(before[&signal])
+            };
+            if left > least {
                 worth += left;
                 still += after[&signal];
             } else {
@@ -352,10 +365,14 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Where the best still leaves something, each of its earlier effects is exchanged for others: alone, a wrong one may
     /// have looked better.
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
-        let bases = carried_on(level).into_iter();
-        let more = bases.flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, starts)).collect();
+        let mut bases = carried_on(level);
+        // What forms may leave is looked into only where the best leaves it.
+        if level.first().is_some_and(|best| self.may_be_form(&best.fitted.losses)) {
+            bases.truncate(1);
+        }
+        let more = bases.into_iter().flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, starts)).collect();
         let mut next = self.worth_refining(level, more);
-        let Some(best) = next.first().filter(|best| !self.is_enough(&best.fitted.losses)) else { return next };
+        let Some(best) = next.first().filter(|best| !self.may_be_form(&best.fitted.losses)) else { return next };
         let earlier = best.fitted.hypothesis.parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
         let fewer = earlier.iter().filter_map(|part| self.without(best, part));
         let mut exchanged: Vec<Judged> = fewer.flat_map(|base| self.extend(&base.fitted, false, starts)).collect();
@@ -404,8 +421,10 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Whether a hypothesis with more effects is worth them: it pays, and explains a good part of what is left without.
     fn is_worth(&self, fewer: &Judged, more: &Judged) -> bool {
+        let is_form_alone = self.may_be_form(&fewer.fitted.losses);
+        let least = if is_form_alone { LEAST_OF_FORM } else { LEAST_FURTHER };
         evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE
-            && self.further(fewer, more) > LEAST_FURTHER
+            && self.further(fewer, more) > least
             && self.shows(&fewer.fitted.losses, &more.fitted.losses)
     }
 

@@ -3,24 +3,25 @@ use super::{Description, Effect, Point};
 /// The time constant stays above this share of what it is at the reference pressure.
 const LEAST_SHARE: f64 = 0.05;
 
-/// Shortest time constant of a pole of its own, s: it keeps the integrator from tiny steps.
-const SHORTEST: f64 = 1e-4;
+/// Shortest time constant of a pole of its own, s: no sample shows less, and it keeps the integrator from tiny steps.
+const SHORTEST: f64 = 1e-3;
 
 crate::variables::variables! {
     /// A valve that follows more slowly than nominal.
     ///
     /// # Model
-    /// 1/ω ← 1/ω + τ (1 + g (p/p₀ − 1) + h x/0.1 m), times 1 + e while emptying: `time_constant` τ of a long muscle at p₀ = 2 bar, its
-    /// `growth_with_pressure` g and, with the volume, `growth_with_contraction` h, `emptying_excess` e. A hose or pilot stage before the valve is a pole of its own:
-    /// τ₂ dq/dt = p_target − q, and the valve goes for q: `second_time_constant` τ₂; with both, one after the other,
-    /// `third_time_constant` τ₃.
+    /// 1/ω ← 1/ω + τ (1 + g (p/p₀ − 1) + h x/0.1 m), times 1 + e while emptying: `time_constant` τ of a long muscle at
+    /// p₀ = 2 bar, its `growth_with_pressure` g and, with the volume, `growth_with_contraction` h, `emptying_excess` e. A
+    /// hose or pilot stage before the valve is a pole of its own: τ₂ dq/dt = p_target − q, and the valve goes for q:
+    /// `second_time_constant` τ₂; with both, one after the other, `third_time_constant` τ₃.
     ///
     /// # In the data
     /// The pressure residual is in proportion to the rate of pressure and vanishes when the command is slow; steps of
     /// several sizes separate it from a dead time (whose onset shifts) and from a rate limit (large steps only).
     ///
     /// # Validity
-    /// The time constant is kept above 5 % of its value at 2 bar. The second pole starts settled at the first pressure.
+    /// The time constant is kept above 5 % of its value at 2 bar, that of a pole of its own above 1 ms. These poles start
+    /// settled at the first pressure.
     ///
     /// # Reference
     /// Thesis eq. 5.3.
