@@ -16,8 +16,8 @@ CLAIMED = {
         NAMED: 0.88,
         NOMINAL: 0.99,
         NO_NAME: 0.9,
-        BOTH_NAMED: 0.6,
-        FIRST_OF_TWO: 0.8,
+        BOTH_NAMED: 0.7,
+        FIRST_OF_TWO: 0.9,
     },
 }
 

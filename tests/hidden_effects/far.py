@@ -691,6 +691,7 @@ FAR = {
 
 # Forms that the families of the tool hold by now, or almost: named as far, they would flatter it.
 SINCE_HELD = [
+    AveragedPosition,
     BentForce,
     BentForceGain,
     BentPosition,
