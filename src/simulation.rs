@@ -143,11 +143,17 @@ impl<'a> Motion<'a> {
     fn of(parameters: &'a Parameters, recording: &Recording) -> Self {
         let time = &recording.time;
         let mut readings = recording.bridged(Signal::Contraction).unwrap_or_else(|| vec![0.0; time.len()]);
-        let late = parameters.effects.contraction_delay() + 0.5 * parameters.effects.contraction_averaging();
+        let since: Vec<f64> = time.iter().map(|now| now - time[0]).collect();
+        let (averaging, first) = (parameters.effects.contraction_averaging(), readings[0]);
+        let late = parameters.effects.contraction_delay() + 0.5 * averaging;
         if late > 0.0 {
             readings = ahead(time, &readings, late);
         }
-        let since: Vec<f64> = time.iter().map(|now| now - time[0]).collect();
+        // The first means hold the rest before the start, too; what is left of them is right for a constant speed.
+        let begins = |after: f64| 2.0 * averaging * after / (after + 0.5 * averaging).powi(2);
+        for (reading, after) in readings.iter_mut().zip(&since).take_while(|(_, after)| **after < 0.5 * averaging) {
+            *reading = first + (*reading - first) * begins(*after);
+        }
         let unstretched = |(reading, time): (&f64, &f64)| parameters.effects.true_contraction(*reading, 0.0, *time);
         let unstretched: Vec<f64> = readings.iter().zip(&since).map(unstretched).collect();
         Self { parameters, velocity: slopes(time, &unstretched), readings, time: since }
