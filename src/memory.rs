@@ -8,9 +8,14 @@ use std::collections::VecDeque;
 
 /// Instants that are closer than this, in s, count as the same: far below any step.
 const SAME_INSTANT: f64 = 1e-12;
-/// A pilot that would rest for less than this, in s, before it breaks loose again does not come to rest: so a step of the
-/// command that a recording shows as a steep line ends where the step does.
+/// A command on which a pilot would rest for less than this, in s, before it breaks loose again may be a step, which a recording
+/// shows as a steep line between two samples.
 const SHORTEST_REST: f64 = 0.02;
+/// A command that stays as steep for longer than this, in s, is no step.
+const LONGEST_STEP: f64 = 0.025;
+
+/// Jumps that follow each other faster than this, in s, are told as the line that they follow.
+const FASTEST_JUMPS: f64 = 1e-3;
 
 /// What a model remembers beyond its state.
 pub trait Memory: Default + Clone + Send {
@@ -215,6 +220,8 @@ pub struct Slack {
     pub play: f64,
     /// Deviation at which a stuck pilot jumps to the command, V.
     pub stiction: f64,
+    /// How long a jump takes, s: it lands where the line is by then.
+    pub jump_time: f64,
     /// Where in its play the pilot starts, as a share of the half width.
     pub start: f64,
 }
@@ -231,22 +238,23 @@ impl Slack {
 struct Pilot {
     behind_play: f64,
     stuck_at: f64,
-    /// Direction in which it moves along with the command, having broken loose; 0 where it sticks.
-    moving: f64,
+    /// How long the command has been steep since the pilot broke loose, s, negative where it falls; 0 where it is not.
+    steep: f64,
 }
 
 impl Pilot {
     fn at_rest(slack: &Slack, command: f64) -> Self {
         let position = command + slack.play * slack.start;
-        Self { behind_play: position, stuck_at: position, moving: 0.0 }
+        Self { behind_play: position, stuck_at: position, steep: 0.0 }
     }
 
     /// Follows a line of the command, and tells the lines that come of it.
     fn follow(&mut self, slack: &Slack, line: Line, mut tell: impl FnMut(Line)) {
-        let Self { behind_play, stuck_at, moving } = self;
+        let Self { behind_play, stuck_at, steep } = self;
         follow_with_play(behind_play, slack.play, line, |line| {
             if slack.stiction > 0.0 {
-                follow_with_stiction(stuck_at, moving, slack.stiction, line, &mut tell);
+                let threshold = slack.stiction + slack.jump_time * line.slope.abs();
+                follow_with_stiction(stuck_at, steep, threshold, line, &mut tell);
             } else {
                 tell(line);
             }
@@ -272,37 +280,56 @@ fn follow_with_play(position: &mut f64, half_width: f64, line: Line, mut tell: i
     }
 }
 
-/// Stiction: the position stays until it is off by the threshold, and jumps to the line then. On a steep line it moves on.
-fn follow_with_stiction(position: &mut f64, moving: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
+/// Stiction: the position stays until it is off by the threshold, and jumps to the line then.
+///
+/// A step of the command is one jump, however a recording shows it: on a steep line the pilot moves along from the first jump
+/// on, and rests where that line ends. Where it does not end soon it was no step, and the jumps are looked up.
+fn follow_with_stiction(position: &mut f64, steep: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
     let (speed, direction) = (line.slope.abs(), line.slope.signum());
-    let steep = threshold < SHORTEST_REST * speed;
-    let moves_on = steep && *moving == direction;
-    *moving = if moves_on { direction } else { 0.0 };
-    if moves_on {
-        *position = line.at(line.span);
-        return tell(line);
+    let is_steep = threshold < SHORTEST_REST * speed;
+    let mut loose = line;
+    if !(is_steep && *steep * direction > 0.0) {
+        let was_step = *steep != 0.0 && steep.abs() <= LONGEST_STEP;
+        *steep = 0.0;
+        if was_step || (line.value - *position).abs() >= threshold {
+            *position = line.value;
+        }
+        if !is_steep {
+            return jump_along(position, threshold, line, tell);
+        }
+        let rest = (threshold - direction * (line.value - *position)) / speed;
+        tell(Line { span: line.span.min(rest), value: *position, slope: 0.0, ..line });
+        if rest >= line.span {
+            return;
+        }
+        loose = line.from(rest);
+        *position = loose.value;
     }
-    if (line.value - *position).abs() >= threshold {
-        *position = line.value;
+    let is_smooth = threshold < FASTEST_JUMPS * speed;
+    let moves = if is_smooth { loose.span } else { (LONGEST_STEP - steep.abs()).clamp(0.0, loose.span) };
+    *steep += direction * loose.span;
+    if moves > 0.0 {
+        tell(Line { span: moves, ..loose });
     }
-    let first = if speed == 0.0 { f64::INFINITY } else { (threshold - direction * (line.value - *position)) / speed };
-    if first >= line.span {
-        return tell(Line { value: *position, slope: 0.0, ..line });
+    if moves < loose.span {
+        jump_along(position, threshold, loose.from(moves), tell);
     }
-    tell(Line { span: first, value: *position, slope: 0.0, ..line });
-    let (loose, stair) = (line.from(first), threshold / speed);
-    if steep {
-        (*position, *moving) = (loose.at(loose.span), direction);
-        return tell(loose);
+}
+
+/// A position that is on its way to a line, by jumps each time that it is off by the threshold.
+fn jump_along(position: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
+    let (speed, direction) = (line.slope.abs(), line.slope.signum());
+    *position += direction * threshold * (direction * (line.value - *position) / threshold).floor().max(0.0);
+    let mut rest =
+        if speed == 0.0 { f64::INFINITY } else { (threshold - direction * (line.value - *position)) / speed };
+    let mut left = line;
+    while rest < left.span {
+        tell(Line { span: rest, value: *position, slope: 0.0, ..left });
+        left = left.from(rest);
+        *position = left.value;
+        rest = threshold / speed;
     }
-    let jumps = (loose.span / stair).floor();
-    let landed = |jump: f64| loose.at(jump * stair);
-    for jump in 0..=jumps as u32 {
-        let after = f64::from(jump) * stair;
-        let span = stair.min(loose.span - after);
-        tell(Line { start: loose.start + after, span, value: landed(f64::from(jump)), slope: 0.0 });
-    }
-    *position = landed(jumps);
+    tell(Line { value: *position, slope: 0.0, ..left });
 }
 
 /// What a muscle with its valve remembers.
@@ -401,7 +428,7 @@ impl Memory for PlantMemory {
     }
 
     fn save(&self, saved: &mut Vec<f64>) {
-        let pilot = self.pilot.map(|pilot| [pilot.behind_play, pilot.stuck_at, pilot.moving]);
+        let pilot = self.pilot.map(|pilot| [pilot.behind_play, pilot.stuck_at, pilot.steep]);
         saved.push(f64::from(u8::from(pilot.is_some())));
         saved.extend(pilot.into_iter().flatten());
         self.command.save(saved);
@@ -411,8 +438,8 @@ impl Memory for PlantMemory {
     fn load(saved: &[f64]) -> Option<Self> {
         let (pilot, rest) = match saved {
             [0.0, rest @ ..] => (None, rest),
-            [1.0, behind_play, stuck_at, moving, rest @ ..] => {
-                (Some(Pilot { behind_play: *behind_play, stuck_at: *stuck_at, moving: *moving }), rest)
+            [1.0, behind_play, stuck_at, steep, rest @ ..] => {
+                (Some(Pilot { behind_play: *behind_play, stuck_at: *stuck_at, steep: *steep }), rest)
             }
             _ => return None,
         };

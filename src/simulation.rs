@@ -144,16 +144,13 @@ impl<'a> Motion<'a> {
         let time = &recording.time;
         let mut readings = recording.bridged(Signal::Contraction).unwrap_or_else(|| vec![0.0; time.len()]);
         let since: Vec<f64> = time.iter().map(|now| now - time[0]).collect();
-        let (averaging, first) = (parameters.effects.contraction_averaging(), readings[0]);
+        let averaging = parameters.effects.contraction_averaging();
+        let first = readings[0];
         let late = parameters.effects.contraction_delay() + 0.5 * averaging;
         if late > 0.0 {
             readings = ahead(time, &readings, late);
         }
-        // The first means hold the rest before the start, too; what is left of them is right for a constant speed.
-        let begins = |after: f64| 2.0 * averaging * after / (after + 0.5 * averaging).powi(2);
-        for (reading, after) in readings.iter_mut().zip(&since).take_while(|(_, after)| **after < 0.5 * averaging) {
-            *reading = first + (*reading - first) * begins(*after);
-        }
+        undo_rest_in_means(&since, &mut readings, first, averaging);
         let unstretched = |(reading, time): (&f64, &f64)| parameters.effects.true_contraction(*reading, 0.0, *time);
         let unstretched: Vec<f64> = readings.iter().zip(&since).map(unstretched).collect();
         Self { parameters, velocity: slopes(time, &unstretched), readings, time: since }
@@ -168,6 +165,13 @@ impl<'a> Motion<'a> {
     fn pull(&self) -> Option<fn(&ActuatorOutputs) -> f64> {
         let stretches = |pull: f64| self.parameters.effects.true_contraction(0.0, pull, 0.0);
         (stretches(0.0) != stretches(100.0)).then_some(|out| out.force)
+    }
+}
+
+/// Takes out of the first means over a time in s the rest at `first` before the start; right for a constant speed.
+fn undo_rest_in_means(since: &[f64], means: &mut [f64], first: f64, averaging: f64) {
+    for (mean, after) in means.iter_mut().zip(since).take_while(|(_, after)| **after < 0.5 * averaging) {
+        *mean = first + (*mean - first) * 2.0 * averaging * after / (after + 0.5 * averaging).powi(2);
     }
 }
 

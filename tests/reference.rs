@@ -92,6 +92,7 @@ fn effects_agree_with_scipy() {
         ("uneven_dead_time", &[("valve_dead_time.delay", 0.0373), ("valve_dead_time.falling_excess", 0.5)]),
         ("play", &[("valve_dead_band.play", 0.11)]),
         ("stiction", &[("valve_dead_band.stiction", 0.17)]),
+        ("late_stiction", &[("valve_dead_band.stiction", 0.17), ("valve_dead_band.jump_time", 0.01)]),
         ("overlap", &[("valve_dead_band.pressure_overlap", 6e3), ("valve_dead_band.overlap_steepness", 3.0)]),
         (
             "flow_limit",
@@ -101,6 +102,17 @@ fn effects_agree_with_scipy() {
                 ("flow_limit.roundness", 0.25),
                 ("flow_limit.emptying_with_pressure", 0.4),
                 ("flow_limit.volume_growth", 0.3),
+            ],
+        ),
+        (
+            "nozzle",
+            &[
+                ("flow_limit.filling", 1.2e5),
+                ("flow_limit.emptying", 0.8e5),
+                ("flow_limit.roundness", 0.25),
+                ("flow_limit.volume_growth", 0.3),
+                ("flow_limit.supply_pressure", 4e5),
+                ("flow_limit.critical_ratio", 0.4),
             ],
         ),
         ("leakage", &[("leakage.rate", 0.8), ("leakage.choked_share", 0.4), ("leakage.volume_growth", 0.4)]),

@@ -339,12 +339,38 @@ impl<'a> Bench<'a> {
     }
 
     /// A model at least as good, with sizes nearby of those effects whose error has many minima.
-    pub fn scanned(&self, fitted: &Fitted) -> Parameters {
-        let sizes = fitted.hypothesis.parts.iter().map(|part| part.effect.forms[part.form][0]);
+    pub fn scanned(&self, hypothesis: &Hypothesis, model: &Parameters) -> Parameters {
+        let sizes = hypothesis.parts.iter().map(|part| part.effect.forms[part.form][0]);
         sizes
             .filter(many_minima)
             .flat_map(|(size, _)| SCANS.map(|share| (size, share)))
-            .fold(fitted.parameters, |model, (size, share)| self.best_nearby(&model, size, share).unwrap_or(model))
+            .fold(*model, |model, (size, share)| self.best_nearby(&model, size, share).unwrap_or(model))
+    }
+
+    /// Where a fit starts that frees more of an effect than the `known` parameters of a model: at the first start of each, or,
+    /// where the error has many minima over the size, at the best of all with its size.
+    pub fn refined_start(
+        &self,
+        hypothesis: &Hypothesis,
+        model: &Parameters,
+        part: Part,
+        known: &[&str],
+    ) -> Option<Parameters> {
+        let new: Vec<_> = part.freed().filter(|(name, _)| !known.contains(name)).collect();
+        let at = |choice: usize| {
+            new.iter().fold(*model, |model, (name, values)| {
+                with_values(&model, &[declared(&model, name).0], &[values[choice.min(values.len() - 1)]])
+            })
+        };
+        if !many_minima(&part.effect.forms[part.form][0]) {
+            return Some(at(0));
+        }
+        let choices = new.iter().map(|(_, values)| values.len()).max().unwrap_or(1);
+        let starts = (0..choices).filter_map(|choice| {
+            let start = self.scanned(hypothesis, &at(choice));
+            Some((cost(&self.data.residuals(&start)?, &self.weights), start))
+        });
+        starts.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
     }
 
     fn best_nearby(&self, model: &Parameters, size: &str, share: f64) -> Option<Parameters> {
@@ -422,15 +448,22 @@ impl<'a> Bench<'a> {
         Some(Start { promise, part, choice, parameters })
     }
 
-    /// A model with an effect of its own exchanged for another form of it, at the start that leaves least; `None` where none
-    /// can be simulated.
-    pub fn best_start(&self, model: &Parameters, part: Part) -> Option<Parameters> {
-        let without = neutralised(model, part.effect);
-        let starts = (0..part.starts()).into_par_iter().filter_map(|choice| {
-            let model = at_start(&without, part, choice);
-            Some((cost(&self.data.residuals(&model)?, &self.weights), choice, model))
+    /// A model with an effect of its own exchanged for another form of it, at the start that leaves least, be it with what both
+    /// forms have as it was or not; `None` where none can be simulated.
+    pub fn best_start(&self, model: &Parameters, from: Part, to: Part) -> Option<Parameters> {
+        let without = neutralised(model, to.effect);
+        let shared = from.freed().filter(|(name, _)| to.freed().any(|(other, _)| other == name));
+        let (variables, values): (Vec<_>, Vec<_>) = shared.map(|(name, _)| declared(model, name)).unzip();
+        let starts = (0..to.starts()).flat_map(|choice| {
+            let anew = at_start(&without, to, choice);
+            [with_values(&anew, &variables, &values), anew]
         });
-        starts.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(.., model)| model)
+        let costs = starts
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .enumerate()
+            .filter_map(|(k, model)| Some((cost(&self.data.residuals(&model)?, &self.weights), k, model)));
+        costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(.., model)| model)
     }
 
     /// Share of the squares that goes away when a change is scaled, up to five times in either direction, and the

@@ -3,7 +3,7 @@
 use super::Verdict;
 use super::candidates::{Bench, Fitted, Hypothesis, Part, Refined, Slopes, Start, has_many_minima, neutralised};
 use super::residuals::{Data, Loss, Scope};
-use crate::effects::Effects;
+use crate::effects::{Effects, Holds};
 use crate::measurement::Signal;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -17,6 +17,9 @@ const RIVAL: f64 = 3.0;
 const LEAST_EXPLAINED: (f64, f64) = (0.96, 0.9);
 /// The same where all causes are scales and zeros: these have no form that could differ from ours.
 const LEAST_EXPLAINED_EXACTLY: (f64, f64) = (0.995, 0.95);
+/// The same where a cause is left to chance. A pilot that sticks ends each fast move anywhere between the command and its
+/// threshold h before it: of the mean square h²/3 of that, the variance h²/12 cannot be foretold.
+const LEAST_EXPLAINED_BUT_FOR_CHANCE: (f64, f64) = (0.75, 0.75);
 /// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
 const LEAST_FURTHER: f64 = 0.8;
 /// The same of what is little enough to be the first one's form: a cause of its own leaves next to nothing of it.
@@ -38,6 +41,8 @@ const UNEXPLAINED: f64 = 9.75;
 const NOISE_DOUBT: f64 = 3.0;
 /// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
 const BEAM: usize = 3;
+/// Hypotheses that may become rivals: of those that explain enough, so many by their odds and so many by what they explain.
+const MAY_BE_RIVALS: usize = 5;
 /// Most effects that are looked for at once.
 const MOST_EFFECTS: usize = 3;
 /// Candidates that are fitted, of those that look promising: for the first effect, and for further ones; and the share of the
@@ -115,9 +120,14 @@ fn unsound(left: &BTreeMap<Signal, f64>, data: &Data) -> f64 {
     left.iter().map(|(signal, left)| (left - NEGLIGIBLE - data.structure(*signal)).max(0.0)).sum()
 }
 
-/// Whether more is left of some signal than noise and that.
+/// Whether no signal has more left beyond noise than it may.
+fn leaves_at_most(losses: &[Loss], most: impl Fn(Signal) -> f64) -> bool {
+    beyond_noise(losses).into_iter().all(|(signal, left)| left <= most(signal))
+}
+
+/// Whether more is left of some signal than noise and the structural error that a sound model may have.
 fn is_unsound(losses: &[Loss], data: &Data) -> bool {
-    unsound(&beyond_noise(losses), data) > 0.0
+    !leaves_at_most(losses, |signal| NEGLIGIBLE + data.structure(signal))
 }
 
 /// Share of the error beyond noise that goes away.
@@ -128,7 +138,7 @@ fn explained(without: &[Loss], with: &[Loss], data: &Data) -> f64 {
 
 /// Whether nothing beyond noise is left that is worth a look.
 fn is_negligible(losses: &[Loss]) -> bool {
-    beyond_noise(losses).values().all(|left| *left <= NEGLIGIBLE)
+    leaves_at_most(losses, |_| NEGLIGIBLE)
 }
 
 impl Chosen {
@@ -250,29 +260,34 @@ impl<'a, 'b> Search<'a, 'b> {
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
-        let Some(best) = others.next().map(|(_, best)| self.led_by(best)) else { return Vec::new() };
+        let best = others.next().map(|(_, best)| self.in_best_form(best, |losses| self.may_be_form(losses)));
+        let Some(best) = best else { return Vec::new() };
         let may_be_form = self.may_be_form(&best.fitted.losses);
         let is_close = |(rank, _): &(usize, Judged)| if may_be_form { &rivals } else { &ranks }.contains(rank);
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
         let refined = close.into_par_iter().map(|(_, judged)| {
             let last = judged.fitted.hypothesis.parts.len() - 1;
-            self.finished(if may_be_form { self.refined(judged) } else { self.part_refined(judged, last) })
+            if may_be_form {
+                self.in_best_form(judged, |losses| !is_unsound(losses, &self.bench.data))
+            } else {
+                self.finished(self.part_refined(judged, last))
+            }
         });
         sorted(refined.chain([best]).chain(rest).collect())
     }
 
     fn finished(&self, judged: Judged) -> Judged {
-        let start = self.bench.scanned(&judged.fitted);
+        let start = self.bench.scanned(&judged.fitted.hypothesis, &judged.fitted.parameters);
         self.bench
             .exact_fit(&judged.fitted.hypothesis, &start, Scope::All)
             .map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// The hypothesis that leads a level, refined in all its effects and, where that is not enough, in the best form of its last.
-    fn led_by(&self, judged: Judged) -> Judged {
+    /// A hypothesis refined in all its effects and, where what is left then is too much, in the best form of its last.
+    fn in_best_form(&self, judged: Judged, is_enough: impl Fn(&[Loss]) -> bool) -> Judged {
         let refined = self.finished(self.refined(judged.clone()));
-        if self.may_be_form(&refined.fitted.losses) {
+        if is_enough(&refined.fitted.losses) {
             return refined;
         }
         let other = self.in_other_forms(&judged).map(|other| self.finished(self.refined(other)));
@@ -285,7 +300,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let others = (0..last.effect.forms.len()).filter(|form| *form != last.form).collect::<Vec<_>>().into_par_iter();
         let fits = others.filter_map(|form| {
             let part = Part { form, refined: Refined::Not, ..*last };
-            let start = self.bench.best_start(&judged.fitted.parameters, part)?;
+            let start = self.bench.best_start(&judged.fitted.parameters, *last, part)?;
             let hypothesis = judged.fitted.hypothesis.without(last.effect.name).with(part);
             Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
         });
@@ -317,10 +332,8 @@ impl<'a, 'b> Search<'a, 'b> {
         let part = &mut hypothesis.parts[which];
         let known: Vec<&str> = part.freed().map(|(name, _)| *name).collect();
         part.refined = refined;
-        let mut start = judged.fitted.parameters;
-        for (name, values) in part.freed().filter(|(name, _)| !known.contains(name)) {
-            start.set(name, values[0]).ok()?;
-        }
+        let part = *part;
+        let start = self.bench.refined_start(&hypothesis, &judged.fitted.parameters, part, &known)?;
         Some(self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &start)?))
     }
 
@@ -334,7 +347,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Whether residuals are small enough to be those of forms, which are never known exactly.
     fn may_be_form(&self, losses: &[Loss]) -> bool {
         let before = beyond_noise(&self.baseline.losses);
-        beyond_noise(losses).iter().all(|(signal, left)| *left <= left_by_form(before[signal]))
+        leaves_at_most(losses, |signal| left_by_form(before[&signal]))
     }
 
     /// Share of what a hypothesis leaves that another one explains, in the signals in which it leaves more than forms may; where
@@ -404,8 +417,7 @@ impl<'a, 'b> Search<'a, 'b> {
     fn is_sound(&self, losses: &[Loss]) -> bool {
         let data = &self.bench.data;
         let doubt = |signal| NOISE_DOUBT * data.noise_doubt(signal);
-        let allowance = |signal| NEGLIGIBLE + doubt(signal) + UNEXPLAINED.powi(2) * data.structure(signal);
-        beyond_noise(losses).into_iter().all(|(signal, beyond)| beyond <= allowance(signal))
+        leaves_at_most(losses, |signal| NEGLIGIBLE + doubt(signal) + UNEXPLAINED.powi(2) * data.structure(signal))
     }
 
     /// The best hypothesis of all levels, each of which must be worth its effects.
@@ -550,8 +562,11 @@ impl<'a, 'b> Search<'a, 'b> {
 
 /// Share of the error that the effects of a fit must explain: of all samples, and of those that it did not see.
 fn least_explained(fitted: &Fitted) -> (f64, f64) {
-    let exact = fitted.hypothesis.parts.iter().all(|part| part.effect.exact);
-    if exact { LEAST_EXPLAINED_EXACTLY } else { LEAST_EXPLAINED }
+    match fitted.hypothesis.parts.iter().map(|part| part.effect.holds).max() {
+        Some(Holds::Exactly) => LEAST_EXPLAINED_EXACTLY,
+        Some(Holds::ButForChance) => LEAST_EXPLAINED_BUT_FOR_CHANCE,
+        Some(Holds::AsLaw) | None => LEAST_EXPLAINED,
+    }
 }
 
 fn same_effects(a: &Judged, b: &Judged) -> bool {
@@ -579,9 +594,9 @@ fn carried_on(level: &[Judged]) -> Vec<usize> {
 /// the most, since in one signal a form that is not quite right spoils the odds.
 fn may_rival(level: &[Judged]) -> Vec<usize> {
     let mut ranks: Vec<usize> = (0..level.len()).filter(|rank| level[*rank].explained > MAY_RIVAL).collect();
-    let best: Vec<usize> = ranks.iter().copied().filter(|rank| *rank < BEAM).collect();
+    let best: Vec<usize> = ranks.iter().copied().filter(|rank| *rank < MAY_BE_RIVALS).collect();
     ranks.sort_by(|a, b| level[*b].explained.total_cmp(&level[*a].explained));
-    ranks.truncate(BEAM);
+    ranks.truncate(MAY_BE_RIVALS);
     best.into_iter().chain(ranks).collect()
 }
 

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 crate::variables::variables! {
     /// A membrane that is stiffer or softer than nominal.
@@ -37,7 +37,7 @@ impl Effect for BladderStiffness {
         experiment: "stretch the muscle without pressure; the same motion at two constant pressures",
         reference: "thesis eqs. 4.5, 4.17",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[
             &[("bladder_stiffness.relative_change", &[0.15, -0.15])],
             &[("bladder_stiffness.added_force", &[60.0, -60.0]), ("bladder_stiffness.added_growth", &[0.3])],

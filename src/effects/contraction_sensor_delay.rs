@@ -1,4 +1,4 @@
-use super::{Description, Effect};
+use super::{Description, Effect, Holds};
 
 crate::variables::variables! {
     /// A position sensor that is late.
@@ -33,7 +33,7 @@ impl Effect for ContractionSensorDelay {
         experiment: "fast motion with force recorded, or a second position sensor",
         reference: "definition",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[
             &[("contraction_sensor_delay.delay", &[0.02, 0.06])],
             &[("contraction_sensor_delay.averaging", &[0.04, 0.12])],

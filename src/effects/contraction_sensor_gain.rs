@@ -1,4 +1,4 @@
-use super::{Description, Effect, REFERENCE_CONTRACTION, Readings, scaled, unscaled};
+use super::{Description, Effect, Holds, REFERENCE_CONTRACTION, Readings, scaled, unscaled};
 
 crate::variables::variables! {
     /// A position sensor whose scale is off.
@@ -31,7 +31,7 @@ impl Effect for ContractionSensorGain {
         experiment: "compare with a ruler at two lengths",
         reference: "definition",
         of_load: false,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[
             &[("contraction_sensor_gain.relative_error", &[0.05, -0.05])],
             // A gain alone may be what the coefficients of the muscle stand for.

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Readings, settling};
+use super::{Description, Effect, Holds, Readings, settling};
 
 crate::variables::variables! {
     /// A position sensor whose zero is not at the rest length.
@@ -40,7 +40,7 @@ impl Effect for ContractionSensorOffset {
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
         of_load: false,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[
             &[("contraction_sensor_offset.offset", &[5e-3, -5e-3])],
             // Corrections of the muscle take a constant offset over, and leave how it settles.

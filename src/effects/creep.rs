@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 crate::variables::variables! {
     /// Creep: the membrane gives way slowly, or settles into the braid slowly.
@@ -65,7 +65,7 @@ impl Effect for Creep {
         experiment: "hold for a minute after a step, up and down",
         reference: "Kelvin-Voigt; Minh et al. 2010",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[
             &[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.pull_amplitude", &[0.15]), ("creep.time_1", &[1.5, 10.0])],

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 /// Gauge pressure in Pa over which the part that belongs to low pressure fades.
 const FADE: f64 = 1e5;
@@ -38,7 +38,7 @@ impl Effect for EndEffects {
         experiment: "compare two rest lengths",
         reference: "Tondu and Lopez 2000; Kothera et al. 2009",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[&[("end_effects.excess", &[0.1])]],
         refinements: &[("end_effects.low_pressure_excess", &[0.05]), ("end_effects.growth", &[0.3])],
     };

@@ -1,7 +1,9 @@
-use super::{AMBIENT_PRESSURE, Description, Effect, Point, REFERENCE_PRESSURE};
+use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point, REFERENCE_PRESSURE};
 
 /// Rate in Pa/s from which on there is no limit.
 const NONE: f64 = 1e9;
+/// Pressure in Pa from which on a supply counts as unlimited.
+const NO_SUPPLY: f64 = 1e8;
 
 crate::variables::variables! {
     /// Filling and emptying that are limited in rate.
@@ -10,7 +12,10 @@ crate::variables::variables! {
     /// The rate r of pressure becomes r / (1 + |r/m|ⁿ)^(1/n), n = 1/`roundness`; for zero roundness it is clipped at m.
     /// The limit m is `filling` or `emptying`; the latter changes with absolute pressure by the share
     /// `emptying_with_pressure` c, m (1 − c + c (p + 1 bar)/3 bar), and both shrink with the volume,
-    /// m / (1 + `volume_growth` x/0.1 m), and grow with what is missing, m (|p_target − p|/1 bar)^e, `exponent` e.
+    /// m / (1 + `volume_growth` x/0.1 m), and grow with what is missing, m (|p_target − p|/1 bar)^e, `exponent` e. Where the
+    /// pressure p_s of the supply is known, `supply_pressure`, filling fades towards it by ψ(p/p_s), absolute, and emptying is in
+    /// proportion to absolute pressure and fades towards the ambient one by ψ(p_0/p): ψ(r) = √(1 − ((r − b)/(1 − b))²) above
+    /// `critical_ratio` b, 1 below.
     ///
     /// # In the data
     /// After large steps the pressure rises along a ramp whose slope does not depend on the size of the step, and falls
@@ -18,7 +23,8 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// A stand-in for ISO 6358: choked inflow gives a constant rate, choked outflow one in proportion to absolute
-    /// pressure; the roundness in between is no physical constant. A long narrow hose with turbulent flow lets through what
+    /// pressure; the roundness in between is no physical constant. With a pressure of the supply it is the standard itself, for
+    /// isothermal air. A long narrow hose with turbulent flow lets through what
     /// goes with the root of the difference in pressure, `exponent` 0.5.
     ///
     /// # Reference
@@ -36,19 +42,28 @@ crate::variables::variables! {
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
         /// Power of the missing pressure, in bar, with which the limits grow
         exponent: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Gauge pressure of the supply; the flow does not fade towards it at the largest value
+        supply_pressure: f64 = NO_SUPPLY, PASCAL, (2e5..=NO_SUPPLY);
+        /// Ratio of pressures below which the flow is choked
+        critical_ratio: f64 = 0.3, ONE, (0.05..=0.9);
     }
 }
 
 /// Pressure in Pa that is taken to be missing at least; not physical, it keeps a limit that goes with it above zero.
 const LEAST_MISSING: f64 = 10.0;
+/// Share of the choked flow that there is at least; not physical, it keeps a limit above zero.
+const LEAST_SHARE: f64 = 1e-3;
 
 impl FlowLimit {
     fn limit(&self, at: &Point, rate: f64) -> f64 {
-        let most = if rate > 0.0 {
-            self.filling
-        } else {
-            let absolute = (at.gauge_pressure + AMBIENT_PRESSURE) / (REFERENCE_PRESSURE + AMBIENT_PRESSURE);
-            self.emptying * (1.0 + self.emptying_with_pressure * (absolute - 1.0))
+        let absolute = at.gauge_pressure + AMBIENT_PRESSURE;
+        let relative = absolute / (REFERENCE_PRESSURE + AMBIENT_PRESSURE);
+        let is_nozzle = self.supply_pressure < NO_SUPPLY;
+        let most = match (rate > 0.0, is_nozzle) {
+            (true, true) => self.filling * self.share_of_choked(absolute / (self.supply_pressure + AMBIENT_PRESSURE)),
+            (true, false) => self.filling,
+            (false, true) => self.emptying * relative * self.share_of_choked(AMBIENT_PRESSURE / absolute),
+            (false, false) => self.emptying * (1.0 + self.emptying_with_pressure * (relative - 1.0)),
         };
         let most = most / (1.0 + self.volume_growth * at.relative_contraction()).max(0.1);
         if self.exponent == 0.0 {
@@ -56,6 +71,12 @@ impl FlowLimit {
         }
         let missing = (at.target_pressure - at.gauge_pressure).abs() + LEAST_MISSING;
         most * (missing / 1e5).powf(self.exponent)
+    }
+
+    /// Flow through a nozzle at a ratio of absolute pressures, as a share of what flows when choked.
+    fn share_of_choked(&self, ratio: f64) -> f64 {
+        let beyond = (ratio - self.critical_ratio) / (1.0 - self.critical_ratio);
+        (1.0 - beyond.clamp(0.0, 1.0).powi(2)).sqrt().max(LEAST_SHARE)
     }
 }
 
@@ -68,7 +89,7 @@ impl Effect for FlowLimit {
         experiment: "steps of several sizes, up and down",
         reference: "ISO 6358",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[
             &[("flow_limit.filling", &[0.5e5, 1.2e5, 3e5]), ("flow_limit.emptying", &[0.5e5, 1.2e5, 3e5])],
             &[
@@ -81,6 +102,12 @@ impl Effect for FlowLimit {
                 ("flow_limit.emptying", &[0.5e5, 1.2e5, 3e5]),
                 ("flow_limit.roundness", &[0.5]),
                 ("flow_limit.exponent", &[0.5]),
+            ],
+            &[
+                ("flow_limit.filling", &[0.5e5, 1.2e5, 3e5]),
+                ("flow_limit.emptying", &[0.5e5, 1.2e5, 3e5]),
+                ("flow_limit.supply_pressure", &[5e5]),
+                ("flow_limit.critical_ratio", &[0.3]),
             ],
         ],
         refinements: &[

@@ -1,4 +1,4 @@
-use super::{Description, Effect, REFERENCE_FORCE, scaled};
+use super::{Description, Effect, Holds, REFERENCE_FORCE, scaled};
 
 crate::variables::variables! {
     /// A muscle that is stronger or weaker as a whole.
@@ -32,7 +32,7 @@ impl Effect for ForceGain {
         experiment: "two known masses, static and dynamic",
         reference: "definition",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[&[("force_gain.relative_error", &[0.08, -0.08])]],
         refinements: &[("force_gain.bend", &[0.005])],
     };

@@ -1,4 +1,4 @@
-use super::{Description, Effect, REFERENCE_FORCE, Readings, scaled};
+use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings, scaled};
 
 crate::variables::variables! {
     /// A force sensor whose scale is off.
@@ -32,7 +32,7 @@ impl Effect for ForceSensorGain {
         experiment: "hang two known masses on the sensor",
         reference: "definition",
         of_load: false,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[
             &[("force_sensor_gain.relative_error", &[0.05, -0.05])],
             // A gain alone may be what the coefficients of the muscle stand for.

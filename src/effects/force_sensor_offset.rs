@@ -1,4 +1,4 @@
-use super::{Description, Effect, Readings, settling};
+use super::{Description, Effect, Holds, Readings, settling};
 
 crate::variables::variables! {
     /// A force sensor that shows a force where there is none.
@@ -40,7 +40,7 @@ impl Effect for ForceSensorOffset {
         experiment: "read the sensor with nothing attached",
         reference: "definition",
         of_load: false,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[&[("force_sensor_offset.offset", &[20.0, -20.0])]],
         refinements: &[("force_sensor_offset.settling_share", &[0.3]), ("force_sensor_offset.settling_time", &[5.0])],
     };

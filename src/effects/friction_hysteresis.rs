@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 /// Smallest velocity in m/s over which a friction without a loop changes its sign.
 const LEAST_SMOOTHING: f64 = 2e-4;
@@ -93,7 +93,7 @@ impl Effect for FrictionHysteresis {
         experiment: "triangles of shrinking amplitude at three pressures",
         reference: "Dahl 1968; Wen 1976; Andersson et al. 2007; thesis eq. 4.20",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[
             &[
                 ("friction_hysteresis.half_width", &[10.0, 25.0]),

@@ -1,4 +1,4 @@
-use super::{AMBIENT_PRESSURE, Description, Effect, Point};
+use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point};
 
 /// Ratio of pressures below which the flow through a hole is choked: a sharp edge.
 const CRITICAL_RATIO: f64 = 0.3;
@@ -71,7 +71,7 @@ impl Effect for Leakage {
         experiment: "shut the valve and watch the pressure for a minute",
         reference: "ISO 6358",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[&[("leakage.rate", &[0.3, 1.0])], &[("leakage.rate", &[0.3, 1.0]), ("leakage.choked_share", &[0.5])]],
         refinements: &[
             ("leakage.choked_share", &[0.5]),

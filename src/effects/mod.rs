@@ -70,6 +70,17 @@ pub struct Readings {
     pub force: f64,
 }
 
+/// How well an equation of an effect can hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Holds {
+    /// It is a scale or a zero, and its equation is its definition.
+    Exactly,
+    /// It is a law of nature, which is always simpler than nature.
+    AsLaw,
+    /// It is a law, and what hangs on chance is not foretold.
+    ButForChance,
+}
+
 /// What a person needs to know of an effect.
 #[derive(Debug)]
 pub struct Description {
@@ -87,8 +98,8 @@ pub struct Description {
     pub reference: &'static str,
     /// Whether it concerns the load, and so means nothing to a muscle that is moved from outside.
     pub of_load: bool,
-    /// Whether it is a scale or a zero, whose equation is its definition; a law of nature in an equation is always simpler than it.
-    pub exact: bool,
+    /// How well its equation can hold at all.
+    pub holds: Holds,
     /// Common forms of the effect, each the parameters that a fit frees, its size first; the best form stands for the cause.
     pub forms: &'static [&'static [Freed]],
     /// Parameters that are freed as well once the effect leads, and stay free only where the data pay for them.
@@ -303,6 +314,7 @@ macro_rules! effects {
                     let slack = self.$field.slack();
                     all.play += slack.play;
                     all.stiction += slack.stiction;
+                    all.jump_time += slack.jump_time;
                     all.start += slack.start;
                 )*
                 all

@@ -1,4 +1,4 @@
-use super::{Description, Effect};
+use super::{Description, Effect, Holds};
 
 crate::variables::variables! {
     /// A load that is not what was entered.
@@ -30,7 +30,7 @@ impl Effect for PayloadMass {
         experiment: "two known masses, static and dynamic",
         reference: "thesis eq. 5.4",
         of_load: true,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[&[("payload_mass.additional_mass", &[2.0, -2.0])], &[("payload_mass.relative_error", &[0.1, -0.1])]],
         refinements: &[("payload_mass.additional_mass", &[0.5]), ("payload_mass.relative_error", &[0.02])],
     };

@@ -1,4 +1,4 @@
-use super::{Description, Effect, REFERENCE_PRESSURE, Readings, scaled, unscaled};
+use super::{Description, Effect, Holds, REFERENCE_PRESSURE, Readings, scaled, unscaled};
 
 crate::variables::variables! {
     /// A pressure sensor whose scale is off.
@@ -32,7 +32,7 @@ impl Effect for PressureSensorGain {
         experiment: "compare with a second gauge at two pressures",
         reference: "definition",
         of_load: false,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[
             &[("pressure_sensor_gain.relative_error", &[0.05, -0.05])],
             // A gain alone may be what the coefficients of the muscle stand for.

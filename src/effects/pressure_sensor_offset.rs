@@ -1,4 +1,4 @@
-use super::{Description, Effect, Readings, settling};
+use super::{Description, Effect, Holds, Readings, settling};
 
 crate::variables::variables! {
     /// A pressure sensor whose zero is not at ambient pressure.
@@ -41,7 +41,7 @@ impl Effect for PressureSensorOffset {
         experiment: "read the sensor with the muscle open to the air",
         reference: "definition",
         of_load: false,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[&[("pressure_sensor_offset.offset", &[1e4, -1e4])]],
         refinements: &[
             ("pressure_sensor_offset.settling_share", &[0.3]),

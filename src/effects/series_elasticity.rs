@@ -1,4 +1,4 @@
-use super::{Description, Effect, REFERENCE_FORCE, Readings};
+use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings};
 
 crate::variables::variables! {
     /// Something in series with the muscle that stretches: a cable, a fitting, the frame.
@@ -48,7 +48,7 @@ impl Effect for SeriesElasticity {
         experiment: "lock the load and vary the pressure",
         reference: "Hooke",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[
             &[("series_elasticity.load_compliance", &[5e-6])],
             &[("series_elasticity.compliance", &[-5e-6, 5e-6])],

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 /// Ceiling in Pa from which on there is none: beyond what any muscle stands.
 const NONE: f64 = 2e6;
@@ -49,7 +49,7 @@ impl Effect for SupplySaturation {
         experiment: "record the supply pressure; raise it",
         reference: "definition",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[&[("supply_saturation.gauge_pressure", CEILINGS)]],
         refinements: &[
             ("supply_saturation.rounding", &[3e3]),

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 crate::variables::variables! {
     /// Slow change while the muscle warms up.
@@ -12,7 +12,7 @@ crate::variables::variables! {
     /// Creep comes back after every step.
     ///
     /// # Validity
-    /// The recording starts cold. Warmth from work is lumped into one time constant.
+    /// The recording starts cold. Warmth from work is lumped into one time constant; no muscle warms within less than 3 s.
     ///
     /// # Reference
     /// Newton's law of heating; definition.
@@ -22,7 +22,7 @@ crate::variables::variables! {
         /// Relative change of the elastic force when warm
         elastic_change: f64 = 0.0, ONE, (-0.9..=2.0);
         /// Time constant of the warming
-        time_constant: f64 = 15.0, SECOND, (0.5..=1000.0);
+        time_constant: f64 = 15.0, SECOND, (3.0..=1000.0);
     }
 }
 
@@ -35,7 +35,7 @@ impl Effect for TemperatureDrift {
         experiment: "the same cycle for several minutes, from cold",
         reference: "definition",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[&[
             ("temperature_drift.area_change", &[0.05, -0.05]),
             ("temperature_drift.time_constant", &[10.0, 25.0]),

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 crate::variables::variables! {
     /// Pressure that is lost before the muscle responds.
@@ -38,7 +38,7 @@ impl Effect for ThresholdPressure {
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[
             &[("threshold_pressure.lost", &[0.4e5, 1e5]), ("threshold_pressure.fade", &[0.6e5, 1.2e5])],
             &[

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 use crate::memory::Slack;
 
 crate::variables::variables! {
@@ -6,7 +6,7 @@ crate::variables::variables! {
     ///
     /// # Model
     /// Play: the pilot w moves only where the command u pushes it, |u − w| ≤ `play`. Stiction: it rests until
-    /// |u − w| reaches `stiction`, and jumps to u then. Overlap: the spool opens no port while the pressure is off its
+    /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`. Overlap: the spool opens no port while the pressure is off its
     /// target by less than `pressure_overlap` h; beyond, the valve goes for the share min(|e|, s (|e| − h)) of that error e,
     /// `overlap_steepness` s: for one it misses the target by h, for more the port opens the more abruptly. All three may be
     /// there, in this order.
@@ -16,8 +16,8 @@ crate::variables::variables! {
     /// (play), or steps of one size (stiction). Unlike hysteresis of the muscle it is in the pressure.
     ///
     /// # Validity
-    /// Exact for a command of straight lines. A sticking pilot that would rest for less than 20 ms between its jumps moves
-    /// along with the command until that slows down, so that a step of the command is one jump.
+    /// Exact for a command of straight lines, but for steps: where a sticking pilot would rest for less than 20 ms between its
+    /// jumps it moves along with the command, and stays where that slows down within 25 ms, so that a step is one jump.
     ///
     /// # Reference
     /// M. Choudhury, N. Thornhill, S. Shah (2005), Modelling valve stiction, doi 10.1016/j.conengprac.2004.05.005.
@@ -26,6 +26,8 @@ crate::variables::variables! {
         play: f64 = 0.0, VOLT, (0.0..=2.0);
         /// Deviation from the command at which a stuck pilot jumps to it
         stiction: f64 = 0.0, VOLT, (0.0..=2.0);
+        /// How long a jump of a stuck pilot takes
+        jump_time: f64 = 0.0, SECOND, (0.0..=0.1);
         /// Deviation from the target pressure below which no port opens
         pressure_overlap: f64 = 0.0, PASCAL, (0.0..=2e5);
         /// How abruptly a port opens beyond the overlap
@@ -54,14 +56,17 @@ impl Effect for ValveDeadBand {
         experiment: "slow stairs and ramps of the command, up and down, with the muscle locked",
         reference: "Choudhury et al. 2005",
         of_load: false,
-        exact: false,
+        holds: Holds::ButForChance,
         forms: &[
             &[("valve_dead_band.play", &[0.03, 0.08, 0.15])],
             &[("valve_dead_band.stiction", STICTION_STARTS)],
             &[("valve_dead_band.pressure_overlap", &[5e3])],
             &[("valve_dead_band.pressure_overlap", &[3e3, 8e3, 2e4]), ("valve_dead_band.overlap_steepness", &[10.0])],
         ],
-        refinements: &[("valve_dead_band.start", &[0.3, -0.3])],
+        refinements: &[
+            ("valve_dead_band.start", &[0.3, -0.3]),
+            ("valve_dead_band.jump_time", &[2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3]),
+        ],
     };
 
     fn is_neutral(&self) -> bool {
@@ -69,7 +74,7 @@ impl Effect for ValveDeadBand {
     }
 
     fn slack(&self) -> Slack {
-        Slack { play: self.play, stiction: self.stiction, start: self.start }
+        Slack { play: self.play, stiction: self.stiction, jump_time: self.jump_time, start: self.start }
     }
 
     fn target_pressure(&self, at: &Point, _own: &[f64], target: f64) -> f64 {

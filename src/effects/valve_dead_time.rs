@@ -1,4 +1,4 @@
-use super::{Description, Effect};
+use super::{Description, Effect, Holds};
 
 crate::variables::variables! {
     /// A valve that sees its command late.
@@ -33,7 +33,7 @@ impl Effect for ValveDeadTime {
         experiment: "steps of several sizes, sampled fast",
         reference: "definition",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[&[("valve_dead_time.delay", &[0.03, 0.1])]],
         refinements: &[("valve_dead_time.falling_excess", &[0.3, -0.3])],
     };

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 /// Command in V at which the gain is stated when the characteristic is bent: the middle of the usual range.
 const MIDDLE: f64 = 2.0;
@@ -39,13 +39,13 @@ impl Effect for ValveGain {
         experiment: "stairs of the command with the pressure recorded by a second sensor",
         reference: "definition",
         of_load: false,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[
             &[("valve_gain.relative_error", &[0.05, -0.05])],
             &[
                 ("valve_gain.relative_error", &[0.05]),
-                ("valve_gain.slope_change", &[-0.04]),
-                ("valve_gain.knee", &[1.2, 1.8, 2.6]),
+                ("valve_gain.slope_change", &[-0.04, -0.04, -0.04, 0.04, 0.04, 0.04]),
+                ("valve_gain.knee", &[1.2, 1.8, 2.6, 1.2, 1.8, 2.6]),
             ],
         ],
         refinements: &[("valve_gain.bend", &[0.003])],

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 /// The time constant stays above this share of what it is at the reference pressure.
 const LEAST_SHARE: f64 = 0.05;
@@ -50,7 +50,7 @@ impl Effect for ValveLag {
         experiment: "steps of several sizes with pressure recorded",
         reference: "thesis eq. 5.3",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[&[("valve_lag.time_constant", &[0.05])], &[("valve_lag.second_time_constant", &[0.05])]],
         refinements: &[
             ("valve_lag.time_constant", &[0.02]),

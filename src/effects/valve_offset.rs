@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 crate::variables::variables! {
     /// A valve whose zero is off.
@@ -31,7 +31,7 @@ impl Effect for ValveOffset {
         experiment: "stairs of the command with the pressure recorded by a second sensor",
         reference: "definition",
         of_load: false,
-        exact: true,
+        holds: Holds::Exactly,
         forms: &[&[("valve_offset.offset", &[0.1, -0.1])]],
         refinements: &[("valve_offset.settling_share", &[0.3]), ("valve_offset.settling_time", &[5.0])],
     };

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 crate::variables::variables! {
     /// A valve of second order, which overshoots.
@@ -57,7 +57,7 @@ impl Effect for ValveResonance {
         experiment: "steps, and sines of two amplitudes around the natural frequency",
         reference: "definition",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[
             &[("valve_resonance.damping_ratio", &[0.3, 0.5]), ("valve_resonance.natural_frequency", &[20.0, 35.0])],
             &[

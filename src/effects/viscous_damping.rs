@@ -1,4 +1,4 @@
-use super::{Description, Effect, Point};
+use super::{Description, Effect, Holds, Point};
 
 /// Velocity in m/s at which the damping is stated.
 const REFERENCE_VELOCITY: f64 = 0.05;
@@ -47,7 +47,7 @@ impl Effect for ViscousDamping {
         experiment: "the same triangle at three speeds",
         reference: "Reynolds et al. 2003; thesis eq. 3.47",
         of_load: false,
-        exact: false,
+        holds: Holds::AsLaw,
         forms: &[&[("viscous_damping.contraction", &[200.0]), ("viscous_damping.extension", &[200.0])]],
         refinements: &[
             ("viscous_damping.exponent", &[0.2, -0.2]),

@@ -219,19 +219,26 @@ class Play(Plant):
 
 class Stiction(Plant):
     THRESHOLD = 0.17
+    JUMP_TIME = 0.0
 
     def seen(self, command):
         stuck, result = command[0], []
         for t0, t1, u, s in super().seen(command):
             t = t0
             while s != 0:
-                jump = t0 + (stuck + np.sign(s) * self.THRESHOLD - u) / s
+                jump = t0 + (stuck + np.sign(s) * self.THRESHOLD - u) / s + self.JUMP_TIME
                 if jump >= t1:
                     break
                 result.append((t, jump, stuck, 0.0))
                 stuck, t = u + s * (jump - t0), jump
             result.append((t, t1, stuck, 0.0))
         return result
+
+
+class LateStiction(Stiction):
+    """Having broken loose, the pilot takes its time to come to where the command is by then."""
+
+    JUMP_TIME = 0.01
 
 
 class Overlap(Plant):
@@ -248,6 +255,20 @@ class FlowLimit(Plant):
         filling, emptying = 1.2e5 / (1 + 3 * x), 0.8e5 * (0.6 + 0.4 * (pressure + AMBIENT) / 3e5) / (1 + 3 * x)
         most = filling if wanted > 0 else emptying
         return wanted / (1 + abs(wanted / most) ** 4) ** 0.25
+
+
+class Nozzle(Plant):
+    """ISO 6358 from a supply of 4 bar, both ways, with a critical ratio of 0.4; isothermal, in a muscle that grows."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        def flow(upstream, downstream):
+            ratio = downstream / upstream
+            return upstream * (1.0 if ratio < 0.4 else np.sqrt(1 - ((ratio - 0.4) / 0.6) ** 2)) / (1 + 3 * x)
+
+        inside = pressure + AMBIENT
+        filling, emptying = 1.2e5 * flow(4e5 + AMBIENT, inside) / (4e5 + AMBIENT), 0.8e5 * flow(inside, AMBIENT) / 3e5
+        wanted = VALVE_BANDWIDTH * (target - pressure)
+        return wanted / (1 + abs(wanted / (filling if wanted > 0 else emptying)) ** 4) ** 0.25
 
 
 class Leakage(Plant):
@@ -328,8 +349,10 @@ CASES = [
     Case("dead_time", DeadTime(), RAMPS),
     Case("play", Play(), RAMPS),
     Case("stiction", Stiction(), RAMPS),
+    Case("late_stiction", LateStiction(), RAMPS),
     Case("overlap", Overlap(), STAIRS),
     Case("flow_limit", FlowLimit(), STAIRS),
+    Case("nozzle", Nozzle(), STAIRS),
     Case("leakage", Leakage(), STAIRS),
     Case("lifting_seal", LiftingSeal(), STAIRS),
     Case("series_elasticity", SeriesElasticity(), RAMPS),
