@@ -339,47 +339,43 @@ impl<'a> Bench<'a> {
     }
 
     /// A model at least as good, with sizes nearby of those effects whose error has many minima.
-    pub fn scanned(&self, hypothesis: &Hypothesis, model: &Parameters) -> Parameters {
-        let sizes = hypothesis.parts.iter().map(|part| part.effect.forms[part.form][0]);
+    pub fn scanned(&self, fitted: &Fitted) -> Parameters {
+        let sizes = fitted.hypothesis.parts.iter().map(|part| part.effect.forms[part.form][0]);
         sizes
             .filter(many_minima)
             .flat_map(|(size, _)| SCANS.map(|share| (size, share)))
-            .fold(*model, |model, (size, share)| self.best_nearby(&model, size, share).unwrap_or(model))
+            .fold(fitted.parameters, |model, (size, share)| {
+                self.best_nearby(&model, size, share).map_or(model, |(_, better)| better)
+            })
     }
 
     /// Where a fit starts that frees more of an effect than the `known` parameters of a model: at the first start of each, or,
     /// where the error has many minima over the size, at the best of all with its size.
-    pub fn refined_start(
-        &self,
-        hypothesis: &Hypothesis,
-        model: &Parameters,
-        part: Part,
-        known: &[&str],
-    ) -> Option<Parameters> {
+    pub fn refined_start(&self, model: &Parameters, part: Part, known: &[&str]) -> Option<Parameters> {
         let new: Vec<_> = part.freed().filter(|(name, _)| !known.contains(name)).collect();
         let at = |choice: usize| {
             new.iter().fold(*model, |model, (name, values)| {
                 with_values(&model, &[declared(&model, name).0], &[values[choice.min(values.len() - 1)]])
             })
         };
-        if !many_minima(&part.effect.forms[part.form][0]) {
+        let size = &part.effect.forms[part.form][0];
+        if !many_minima(size) {
             return Some(at(0));
         }
         let choices = new.iter().map(|(_, values)| values.len()).max().unwrap_or(1);
-        let starts = (0..choices).filter_map(|choice| {
-            let start = self.scanned(hypothesis, &at(choice));
-            Some((cost(&self.data.residuals(&start)?, &self.weights), start))
-        });
-        starts.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
+        let nearby = (0..choices).filter_map(|choice| self.best_nearby(&at(choice), size.0, SCANS[0]));
+        let best = nearby.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, model)| model)?;
+        self.best_nearby(&best, size.0, SCANS[1]).map(|(_, model)| model)
     }
 
-    fn best_nearby(&self, model: &Parameters, size: &str, share: f64) -> Option<Parameters> {
+    /// The best of a model with sizes nearby, and the sum of squares that it leaves.
+    fn best_nearby(&self, model: &Parameters, size: &str, share: f64) -> Option<(f64, Parameters)> {
         let (variable, value) = declared(model, size);
         let nearby = (-SCAN_STEPS..=SCAN_STEPS).into_par_iter().filter_map(|k| {
             let model = with_values(model, &[variable], &[value * (1.0 + f64::from(k) * share)]);
             Some((k.abs(), cost(&self.data.residuals(&model)?, &self.weights), model))
         });
-        nearby.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(.., model)| model)
+        nearby.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(_, cost, model)| (cost, model))
     }
 
     fn fit(

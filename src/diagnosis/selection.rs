@@ -278,7 +278,7 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     fn finished(&self, judged: Judged) -> Judged {
-        let start = self.bench.scanned(&judged.fitted.hypothesis, &judged.fitted.parameters);
+        let start = self.bench.scanned(&judged.fitted);
         self.bench
             .exact_fit(&judged.fitted.hypothesis, &start, Scope::All)
             .map_or(judged.clone(), |fitted| self.judge(fitted))
@@ -333,7 +333,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let known: Vec<&str> = part.freed().map(|(name, _)| *name).collect();
         part.refined = refined;
         let part = *part;
-        let start = self.bench.refined_start(&hypothesis, &judged.fitted.parameters, part, &known)?;
+        let start = self.bench.refined_start(&judged.fitted.parameters, part, &known)?;
         Some(self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &start)?))
     }
 

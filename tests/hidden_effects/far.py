@@ -705,6 +705,7 @@ SINCE_HELD = [
     KneedGain,
     LiftingSeal,
     LogisticThreshold,
+    NozzleFlow,
     PorousLeak,
     RingingPilot,
     RubberBladder,
