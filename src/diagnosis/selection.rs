@@ -260,19 +260,14 @@ impl<'a, 'b> Search<'a, 'b> {
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
-        let best = others.next().map(|(_, best)| self.in_best_form(best, |losses| self.may_be_form(losses)));
-        let Some(best) = best else { return Vec::new() };
+        let Some(best) = others.next().map(|(_, best)| self.in_best_form(best)) else { return Vec::new() };
         let may_be_form = self.may_be_form(&best.fitted.losses);
         let is_close = |(rank, _): &(usize, Judged)| if may_be_form { &rivals } else { &ranks }.contains(rank);
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
         let refined = close.into_par_iter().map(|(_, judged)| {
             let last = judged.fitted.hypothesis.parts.len() - 1;
-            if may_be_form {
-                self.in_best_form(judged, |losses| !is_unsound(losses, &self.bench.data))
-            } else {
-                self.finished(self.part_refined(judged, last))
-            }
+            if may_be_form { self.in_best_form(judged) } else { self.finished(self.part_refined(judged, last)) }
         });
         sorted(refined.chain([best]).chain(rest).collect())
     }
@@ -284,10 +279,10 @@ impl<'a, 'b> Search<'a, 'b> {
             .map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// A hypothesis refined in all its effects and, where what is left then is too much, in the best form of its last.
-    fn in_best_form(&self, judged: Judged, is_enough: impl Fn(&[Loss]) -> bool) -> Judged {
+    /// A hypothesis refined in all its effects and, where something is left then, in the best form of its last.
+    fn in_best_form(&self, judged: Judged) -> Judged {
         let refined = self.finished(self.refined(judged.clone()));
-        if is_enough(&refined.fitted.losses) {
+        if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;
         }
         let other = self.in_other_forms(&judged).map(|other| self.finished(self.refined(other)));
