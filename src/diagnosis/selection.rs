@@ -189,7 +189,7 @@ impl<'a, 'b> Search<'a, 'b> {
             self.bench.refine_noise(&residuals);
             singles = self.judged_anew(singles);
         }
-        let mut levels = vec![self.refined_best(singles)];
+        let mut levels = vec![if self.may_show() { self.refined_best(singles) } else { singles }];
         while levels.len() < MOST_EFFECTS && self.is_worth_going_on(&levels) {
             let next = self.next_level(levels.last()?, &starts);
             levels.push(next);
@@ -439,8 +439,16 @@ impl<'a, 'b> Search<'a, 'b> {
     /// less may be that.
     fn shows(&self, without: &[Loss], with: &[Loss]) -> bool {
         let (before, after) = (beyond_noise(without), beyond_noise(with));
-        let least = |signal| self.bench.data.structure(signal).max(NEGLIGIBLE);
-        before.into_iter().any(|(signal, beyond)| beyond - after[&signal] > least(signal))
+        before.into_iter().any(|(signal, beyond)| beyond - after[&signal] > self.least_shown(signal))
+    }
+
+    fn least_shown(&self, signal: Signal) -> f64 {
+        self.bench.data.structure(signal).max(NEGLIGIBLE)
+    }
+
+    /// Whether an effect could show at all.
+    fn may_show(&self) -> bool {
+        !leaves_at_most(&self.baseline.losses, |signal| self.least_shown(signal))
     }
 
     /// Drops effects that a hypothesis of several can spare, the most superfluous first.
