@@ -297,7 +297,7 @@ fn follow_with_stiction(position: &mut f64, steep: &mut f64, threshold: f64, lin
         if !is_steep {
             return jump_along(position, threshold, line, tell);
         }
-        let rest = (threshold - direction * (line.value - *position)) / speed;
+        let rest = rest_until_off(*position, threshold, &line);
         tell(Line { span: line.span.min(rest), value: *position, slope: 0.0, ..line });
         if rest >= line.span {
             return;
@@ -316,12 +316,17 @@ fn follow_with_stiction(position: &mut f64, steep: &mut f64, threshold: f64, lin
     }
 }
 
+/// Time in s until a line is off a position by the threshold, on the side to which it goes.
+fn rest_until_off(position: f64, threshold: f64, line: &Line) -> f64 {
+    let off = line.slope.signum() * (line.value - position);
+    if line.slope == 0.0 { f64::INFINITY } else { (threshold - off) / line.slope.abs() }
+}
+
 /// A position that is on its way to a line, by jumps each time that it is off by the threshold.
 fn jump_along(position: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
     let (speed, direction) = (line.slope.abs(), line.slope.signum());
     *position += direction * threshold * (direction * (line.value - *position) / threshold).floor().max(0.0);
-    let mut rest =
-        if speed == 0.0 { f64::INFINITY } else { (threshold - direction * (line.value - *position)) / speed };
+    let mut rest = rest_until_off(*position, threshold, &line);
     let mut left = line;
     while rest < left.span {
         tell(Line { span: rest, value: *position, slope: 0.0, ..left });

@@ -107,13 +107,17 @@ impl Part {
 
     /// How many starts its form has.
     fn starts(self) -> usize {
-        self.freed().map(|(_, starts)| starts.len()).max().unwrap_or(0)
+        count_starts(self.freed())
     }
 }
 
-/// A model with an effect at one of the starts of its form.
-fn at_start(model: &Parameters, part: Part, choice: usize) -> Parameters {
-    part.freed().fold(*model, |model, (name, values)| {
+fn count_starts<'f>(freed: impl Iterator<Item = &'f Freed>) -> usize {
+    freed.map(|(_, starts)| starts.len()).max().unwrap_or(0)
+}
+
+/// A model with parameters at one of their starts.
+fn at_start<'f>(model: &Parameters, freed: impl Iterator<Item = &'f Freed>, choice: usize) -> Parameters {
+    freed.fold(*model, |model, (name, values)| {
         let value = values.get(choice).or(values.last()).copied().unwrap_or_default();
         with_values(&model, &[declared(&model, name).0], &[value])
     })
@@ -353,17 +357,13 @@ impl<'a> Bench<'a> {
     /// where the error has many minima over the size, at the best of all with its size.
     pub fn refined_start(&self, model: &Parameters, part: Part, known: &[&str]) -> Option<Parameters> {
         let new: Vec<_> = part.freed().filter(|(name, _)| !known.contains(name)).collect();
-        let at = |choice: usize| {
-            new.iter().fold(*model, |model, (name, values)| {
-                with_values(&model, &[declared(&model, name).0], &[values[choice.min(values.len() - 1)]])
-            })
-        };
+        let at = |choice: usize| at_start(model, new.iter().copied(), choice);
         let size = &part.effect.forms[part.form][0];
         if !many_minima(size) {
             return Some(at(0));
         }
-        let choices = new.iter().map(|(_, values)| values.len()).max().unwrap_or(1);
-        let nearby = (0..choices).filter_map(|choice| self.best_nearby(&at(choice), size.0, SCANS[0]));
+        let nearby = (0..count_starts(new.iter().copied()).max(1))
+            .filter_map(|choice| self.best_nearby(&at(choice), size.0, SCANS[0]));
         let best = nearby.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, model)| model)?;
         self.best_nearby(&best, size.0, SCANS[1]).map(|(_, model)| model)
     }
@@ -371,11 +371,21 @@ impl<'a> Bench<'a> {
     /// The best of a model with sizes nearby, and the sum of squares that it leaves.
     fn best_nearby(&self, model: &Parameters, size: &str, share: f64) -> Option<(f64, Parameters)> {
         let (variable, value) = declared(model, size);
-        let nearby = (-SCAN_STEPS..=SCAN_STEPS).into_par_iter().filter_map(|k| {
-            let model = with_values(model, &[variable], &[value * (1.0 + f64::from(k) * share)]);
-            Some((k.abs(), cost(&self.data.residuals(&model)?, &self.weights), model))
+        let mut steps: Vec<i32> = (-SCAN_STEPS..=SCAN_STEPS).collect();
+        steps.sort_by_key(|k| k.abs());
+        let nearby =
+            steps.into_iter().map(|k| with_values(model, &[variable], &[value * (1.0 + f64::from(k) * share)]));
+        self.best_of(nearby.collect())
+    }
+
+    /// The model that leaves least, the first of equal ones, and the sum of squares that it leaves; `None` where none can be
+    /// simulated.
+    fn best_of(&self, models: Vec<Parameters>) -> Option<(f64, Parameters)> {
+        let costs = models.into_par_iter().enumerate().filter_map(|(k, model)| {
+            let cost = cost(&self.data.residuals(&model)?, &self.weights);
+            Some((cost, k, model))
         });
-        nearby.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))).map(|(_, cost, model)| (cost, model))
+        costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(cost, _, model)| (cost, model))
     }
 
     fn fit(
@@ -432,7 +442,7 @@ impl<'a> Bench<'a> {
 
     /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.
     pub fn start(&self, base: &Fitted, part: Part, choice: usize) -> Option<Start> {
-        let parameters = at_start(&base.parameters, part, choice);
+        let parameters = at_start(&base.parameters, part.freed(), choice);
         let changed = self.data.residuals(&parameters)?;
         let change = changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect::<Vec<_>>();
         let change = weighted(&change, &self.weights);
@@ -451,15 +461,11 @@ impl<'a> Bench<'a> {
         let shared = from.freed().filter(|(name, _)| to.freed().any(|(other, _)| other == name));
         let (variables, values): (Vec<_>, Vec<_>) = shared.map(|(name, _)| declared(model, name)).unzip();
         let starts = (0..to.starts()).flat_map(|choice| {
-            let anew = at_start(&without, to, choice);
-            [with_values(&anew, &variables, &values), anew]
+            let anew = at_start(&without, to.freed(), choice);
+            let kept = (!variables.is_empty()).then(|| with_values(&anew, &variables, &values));
+            kept.into_iter().chain([anew])
         });
-        let costs = starts
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .enumerate()
-            .filter_map(|(k, model)| Some((cost(&self.data.residuals(&model)?, &self.weights), k, model)));
-        costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(.., model)| model)
+        self.best_of(starts.collect()).map(|(_, model)| model)
     }
 
     /// Share of the squares that goes away when a change is scaled, up to five times in either direction, and the

@@ -115,9 +115,14 @@ fn left_by_form(before: f64) -> f64 {
     NEGLIGIBLE.max(LEFT_BY_FORM * before)
 }
 
-/// What is left beyond noise and the structural error that a sound model may have.
+/// What may be left of a signal's error because of noise and the structural error that a sound model may have.
+fn left_by_structure(signal: Signal, data: &Data) -> f64 {
+    NEGLIGIBLE + data.structure(signal)
+}
+
+/// What is left beyond that.
 fn unsound(left: &BTreeMap<Signal, f64>, data: &Data) -> f64 {
-    left.iter().map(|(signal, left)| (left - NEGLIGIBLE - data.structure(*signal)).max(0.0)).sum()
+    left.iter().map(|(signal, left)| (left - left_by_structure(*signal, data)).max(0.0)).sum()
 }
 
 /// Whether no signal has more left beyond noise than it may.
@@ -127,7 +132,7 @@ fn leaves_at_most(losses: &[Loss], most: impl Fn(Signal) -> f64) -> bool {
 
 /// Whether more is left of some signal than noise and the structural error that a sound model may have.
 fn is_unsound(losses: &[Loss], data: &Data) -> bool {
-    !leaves_at_most(losses, |signal| NEGLIGIBLE + data.structure(signal))
+    !leaves_at_most(losses, |signal| left_by_structure(signal, data))
 }
 
 /// Share of the error beyond noise that goes away.
@@ -353,11 +358,8 @@ impl<'a, 'b> Search<'a, 'b> {
         let (mut worth, mut still) = (0.0, 0.0);
         let is_form_alone = self.may_be_form(&fewer.fitted.losses);
         for (signal, left) in left {
-            let least = if is_form_alone {
-                NEGLIGIBLE + self.bench.data.structure(signal)
-            } else {
-                left_by_form(before[&signal])
-            };
+            let least =
+                if is_form_alone { left_by_structure(signal, &self.bench.data) } else { left_by_form(before[&signal]) };
             if left > least {
                 worth += left;
                 still += after[&signal];

@@ -24,8 +24,8 @@ crate::variables::variables! {
     /// # Validity
     /// A stand-in for ISO 6358: choked inflow gives a constant rate, choked outflow one in proportion to absolute
     /// pressure; the roundness in between is no physical constant. With a pressure of the supply it is the standard itself, for
-    /// isothermal air. A long narrow hose with turbulent flow lets through what
-    /// goes with the root of the difference in pressure, `exponent` 0.5.
+    /// isothermal air. A long narrow hose with turbulent flow lets through what goes with the root of the difference in
+    /// pressure, `exponent` 0.5.
     ///
     /// # Reference
     /// ISO 6358-1:2013, Pneumatic fluid power; deviation: rates instead of conductances.

@@ -6,10 +6,10 @@ crate::variables::variables! {
     ///
     /// # Model
     /// Play: the pilot w moves only where the command u pushes it, |u − w| ≤ `play`. Stiction: it rests until
-    /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`. Overlap: the spool opens no port while the pressure is off its
-    /// target by less than `pressure_overlap` h; beyond, the valve goes for the share min(|e|, s (|e| − h)) of that error e,
-    /// `overlap_steepness` s: for one it misses the target by h, for more the port opens the more abruptly. All three may be
-    /// there, in this order.
+    /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`. Overlap: the spool opens no port while the
+    /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
+    /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
+    /// opens the more abruptly. All three may be there, in this order.
     ///
     /// # In the data
     /// The pressure residual in slow stairs with the muscle locked: a constant that changes sign with the direction
