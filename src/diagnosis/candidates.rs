@@ -158,6 +158,13 @@ impl Hypothesis {
         freed.map(|(name, _)| declared(&Parameters::default(), name).0).collect()
     }
 
+    /// A model with the effects as they are at work in another one.
+    pub fn at_work_in(&self, model: &Parameters, other: &Parameters) -> Parameters {
+        let variables = self.variables();
+        let values: Vec<f64> = variables.iter().map(|variable| declared(other, variable.name).1).collect();
+        with_values(model, &variables, &values)
+    }
+
     /// Whether an effect would have to be larger than it can be: the fit ended at a bound of its size.
     pub fn is_impossible(&self, parameters: &Parameters) -> bool {
         self.parts.iter().any(|part| {

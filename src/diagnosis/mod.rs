@@ -160,20 +160,20 @@ pub fn diagnose(
     };
     let data = Data::new(recordings, nominal, tolerance)?;
     let thinned = thinned(recordings);
-    let searched = |off: Off| {
+    let searched = |off: Off, known: Option<&Chosen>| {
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;
         let mut bench = Bench::new(for_fits, nominal, tolerance, off);
-        let chosen = search(&mut bench, done).ok_or_else(cannot_follow)?;
-        Ok((bench, chosen))
+        let chosen = search(&mut bench, known, done);
+        Ok(chosen.map(|chosen| (bench, chosen)))
     };
     let ways = Off::of(nominal);
-    let (mut bench, mut chosen) = searched(ways[0])?;
+    let (mut bench, mut chosen) = searched(ways[0], None)?.ok_or_else(cannot_follow)?;
     // Coefficients that are each off by themselves can stand for a good part of a further cause.
     if let Some(off) = ways.get(1).filter(|_| chosen.leaves_something(&bench.data)) {
-        let (other_bench, other) = searched(*off)?;
-        if other.adds_to(&chosen, &bench.data) {
-            (bench, chosen) = (other_bench, other);
+        let other = searched(*off, Some(&chosen).filter(|chosen| chosen.names_causes()))?;
+        if let Some(better) = other.filter(|(_, other)| other.adds_to(&chosen, &bench.data)) {
+            (bench, chosen) = better;
         }
     }
     answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
@@ -186,13 +186,17 @@ fn thinned(recordings: &[Recording]) -> Vec<Recording> {
     recordings.iter().map(|recording| recording.thinned(period.clamp(PERIODS.0, PERIODS.1))).collect()
 }
 
-/// The causes of what the nominal model leaves; `None` where it cannot be simulated.
-fn search(bench: &mut Bench, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
+/// The causes of what the nominal model leaves, beside those that are known; `None` where it cannot be simulated.
+fn search(bench: &mut Bench, known: Option<&Chosen>, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
     let first = bench.baseline()?;
     bench.refine_noise(&first.residuals);
     let baseline = bench.baseline()?;
     done("nominal");
-    Search::new(bench, baseline).run(done)
+    let search = Search::new(bench, baseline);
+    match known {
+        Some(known) => search.run_beside(known, done),
+        None => search.run(done),
+    }
 }
 
 /// The choice in words and figures, its errors on all samples.

@@ -147,6 +147,11 @@ fn is_negligible(losses: &[Loss]) -> bool {
 }
 
 impl Chosen {
+    /// Whether any cause is named.
+    pub fn names_causes(&self) -> bool {
+        !self.model.hypothesis.parts.is_empty()
+    }
+
     /// Whether something is wrong of which the model leaves more than noise.
     pub fn leaves_something(&self, data: &Data) -> bool {
         self.verdict != Verdict::Nominal && is_unsound(&data.losses(&self.model.residuals, Scope::All), data)
@@ -188,22 +193,42 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Finds the causes; `done` is told after each candidate.
     pub fn run(mut self, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
-        let (mut singles, starts) = self.singles(done);
+        let starts = self.starts(done);
+        let from = best_of_each(&starts);
+        let mut singles = self.fitted(&self.baseline, starts, FITTED.0);
         if let Some(best) = singles.first().filter(|best| best.evidence > LEAST_EVIDENCE) {
             let residuals = best.fitted.residuals.clone();
-            self.bench.refine_noise(&residuals);
-            singles = self.judged_anew(singles);
+            singles = self.judged_anew(&residuals, singles);
         }
-        let mut levels = vec![if self.may_show() { self.refined_best(singles) } else { singles }];
-        while levels.len() < MOST_EFFECTS && self.is_worth_going_on(&levels) {
-            let next = self.next_level(levels.last()?, &starts);
-            levels.push(next);
-        }
-        self.choose(levels)
+        let singles = if self.may_show() { self.refined_best(singles) } else { singles };
+        self.go_on(vec![singles.clone()], singles, &from)
     }
 
-    /// Judges fits again after the noise became better known.
-    fn judged_anew(&mut self, fits: Vec<Judged>) -> Vec<Judged> {
+    /// Finds causes beside those that another search named, which let coefficients be off otherwise.
+    pub fn run_beside(mut self, known: &Chosen, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
+        let from = best_of_each(&self.starts(done));
+        let anew = |fitted: &Fitted| {
+            let start = fitted.hypothesis.at_work_in(&self.baseline.parameters, &fitted.parameters);
+            Some(self.finished(self.judge(self.bench.rough_fit(&fitted.hypothesis, &start)?)))
+        };
+        let first = [&known.model].into_iter().chain(&known.rivals).filter_map(anew).collect::<Vec<_>>();
+        let residuals = first.first()?.fitted.residuals.clone();
+        let first = self.judged_anew(&residuals, first);
+        self.go_on(vec![first], known.singles.clone(), &from)
+    }
+
+    /// Adds levels of one effect more each while that is worth it, and chooses.
+    fn go_on(&self, mut levels: Vec<Vec<Judged>>, singles: Vec<Judged>, from: &[(Part, usize)]) -> Option<Chosen> {
+        while effects_of(levels.last()?) < MOST_EFFECTS && self.is_worth_going_on(&levels) {
+            let next = self.next_level(levels.last()?, from);
+            levels.push(next);
+        }
+        self.choose(&levels, singles)
+    }
+
+    /// Judges fits again with what the residuals of a better model show of the noise.
+    fn judged_anew(&mut self, residuals: &[f64], fits: Vec<Judged>) -> Vec<Judged> {
+        self.bench.refine_noise(residuals);
         let anew = |mut fitted: Fitted| {
             fitted.losses = self.bench.data.losses(&fitted.residuals, Scope::All);
             fitted
@@ -214,19 +239,14 @@ impl<'a, 'b> Search<'a, 'b> {
         sorted(fits.into_iter().map(|fitted| self.judge(fitted)).collect())
     }
 
-    /// Single effects, the best first, and from where each effect is best fitted.
-    fn singles(&self, done: &(dyn Fn(&str) + Sync)) -> (Vec<Judged>, Vec<(Part, usize)>) {
-        let starts: Vec<Vec<Start>> = Effects::DESCRIPTIONS
-            .par_iter()
-            .map(|effect| {
-                let starts = self.bench.starts(&self.baseline, effect);
-                done(effect.name);
-                starts
-            })
-            .filter(|starts| !starts.is_empty())
-            .collect();
-        let best = starts.iter().map(|starts| (starts[0].part, starts[0].choice)).collect();
-        (self.fitted(&self.baseline, starts, FITTED.0), best)
+    /// Where fits of single effects start, the most promising of each first.
+    fn starts(&self, done: &(dyn Fn(&str) + Sync)) -> Vec<Vec<Start>> {
+        let starts = Effects::DESCRIPTIONS.par_iter().map(|effect| {
+            let starts = self.bench.starts(&self.baseline, effect);
+            done(effect.name);
+            starts
+        });
+        starts.filter(|starts| !starts.is_empty()).collect()
     }
 
     /// The most promising hypotheses with one effect more, the best first. The base that leads is worth a look at every start;
@@ -308,7 +328,7 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
-    /// for them. What hid a refinement of an earlier effect may have been the last one.
+    /// for them. What hid refinements of an earlier effect may have been the last one.
     fn refined(&self, judged: Judged) -> Judged {
         let parts = (0..judged.fitted.hypothesis.parts.len()).rev();
         parts.fold(judged, |judged, which| self.part_refined(judged, which))
@@ -316,14 +336,15 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn part_refined(&self, judged: Judged, which: usize) -> Judged {
         let part = judged.fitted.hypothesis.parts[which];
-        if part.refined != Refined::Not {
-            return judged;
-        }
+        let each = (0..part.effect.refinements.len()).map(Refined::By);
+        let ways: Vec<_> = match part.refined {
+            Refined::Not => [Refined::Not, Refined::Fully].into_iter().chain(each).collect(),
+            Refined::By(_) => vec![Refined::Fully],
+            Refined::Fully => return judged,
+        };
         // What hangs on details hangs on what the corrections do here, too.
         let slopes = self.bench.slopes_of(&judged.fitted);
-        let each = (0..part.effect.refinements.len()).map(Refined::By);
-        let ways = [Refined::Not, Refined::Fully].into_iter().chain(each).collect::<Vec<_>>().into_par_iter();
-        let better = ways.filter_map(|refined| self.refined_by(&judged, which, refined, &slopes));
+        let better = ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes));
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
@@ -339,7 +360,8 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect.
     fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
-        let leading = self.leading(levels).filter(|best| best.fitted.hypothesis.parts.len() == levels.len());
+        let most = levels.last().map_or(0, |level| effects_of(level));
+        let leading = self.leading(levels).filter(|best| best.fitted.hypothesis.parts.len() == most);
         leading.is_some_and(|best| is_unsound(&best.fitted.losses, &self.bench.data))
             && !self.is_sound(&self.baseline.losses)
     }
@@ -466,8 +488,7 @@ impl<'a, 'b> Search<'a, 'b> {
         }
     }
 
-    fn choose(self, levels: Vec<Vec<Judged>>) -> Option<Chosen> {
-        let singles = levels[0].clone();
+    fn choose(&self, levels: &[Vec<Judged>], singles: Vec<Judged>) -> Option<Chosen> {
         let refused = |verdict| {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
             Some(Chosen {
@@ -480,7 +501,7 @@ impl<'a, 'b> Search<'a, 'b> {
             })
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
-        let Some(best) = self.leading(&levels).map(|best| self.pruned(best.clone())) else { return refused(wrong) };
+        let Some(best) = self.leading(levels).map(|best| self.pruned(best.clone())) else { return refused(wrong) };
         if best.explained < least_explained(&best.fitted).0 {
             return refused(wrong);
         }
@@ -494,7 +515,8 @@ impl<'a, 'b> Search<'a, 'b> {
             return refused(wrong);
         }
         let model = if holds_out { model } else { told.fitted };
-        let rivals = self.rivals(&best, &levels[best.fitted.hypothesis.parts.len() - 1]);
+        let of_as_many = levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
+        let rivals = self.rivals(&best, of_as_many.map_or(&[], |level| level));
         let alternatives: Vec<Vec<&'static str>> =
             best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
         let verdict = if alternatives.iter().any(|a| !a.is_empty()) {
@@ -572,6 +594,16 @@ fn least_explained(fitted: &Fitted) -> (f64, f64) {
         Some(Holds::ButForChance) => LEAST_EXPLAINED_BUT_FOR_CHANCE,
         Some(Holds::AsLaw) | None => LEAST_EXPLAINED,
     }
+}
+
+/// How many effects the hypotheses of a level have; 0 where there are none.
+fn effects_of(level: &[Judged]) -> usize {
+    level.first().map_or(0, |judged| judged.fitted.hypothesis.parts.len())
+}
+
+/// From where each effect is best fitted.
+fn best_of_each(starts: &[Vec<Start>]) -> Vec<(Part, usize)> {
+    starts.iter().map(|starts| (starts[0].part, starts[0].choice)).collect()
 }
 
 fn same_effects(a: &Judged, b: &Judged) -> bool {

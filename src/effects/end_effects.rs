@@ -39,7 +39,7 @@ impl Effect for EndEffects {
         reference: "Tondu and Lopez 2000; Kothera et al. 2009",
         of_load: false,
         holds: Holds::AsLaw,
-        forms: &[&[("end_effects.excess", &[0.1])]],
+        forms: &[&[("end_effects.excess", &[0.1, 0.02, -0.02])]],
         refinements: &[("end_effects.low_pressure_excess", &[0.05]), ("end_effects.growth", &[0.3])],
     };
 

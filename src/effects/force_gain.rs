@@ -33,7 +33,7 @@ impl Effect for ForceGain {
         reference: "definition",
         of_load: false,
         holds: Holds::AsLaw,
-        forms: &[&[("force_gain.relative_error", &[0.08, -0.08])]],
+        forms: &[&[("force_gain.relative_error", &[0.08, -0.08, 0.02, -0.02])]],
         refinements: &[("force_gain.bend", &[0.005])],
     };
 
