@@ -4,6 +4,7 @@
 //! and stiction are exact and do not depend on how a line was cut into steps. Nothing is kept of an effect that is not
 //! at work.
 
+use std::array::from_fn;
 use std::collections::VecDeque;
 
 /// Instants that are closer than this, in s, count as the same: far below any step.
@@ -16,6 +17,9 @@ const LONGEST_STEP: f64 = 0.025;
 
 /// Jumps that follow each other faster than this, in s, are told as the line that they follow.
 const FASTEST_JUMPS: f64 = 1e-3;
+
+/// Plays of different widths that share a pilot.
+const PLAYS: usize = 5;
 
 /// What a model remembers beyond its state.
 pub trait Memory: Default + Clone + Send {
@@ -216,8 +220,10 @@ impl History {
 /// How the pilot stage of a valve fails to follow its command; zeros where it does follow.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Slack {
-    /// Half width of the play, V.
+    /// Half width of the play, V: the mean of those that share the pilot.
     pub play: f64,
+    /// By which share of it the widths differ at most.
+    pub play_spread: f64,
     /// Deviation at which a stuck pilot jumps to the command, V.
     pub stiction: f64,
     /// How long a jump takes, s: it lands where the line is by then.
@@ -231,12 +237,17 @@ impl Slack {
     pub fn is_none(&self) -> bool {
         self.play == 0.0 && self.stiction == 0.0
     }
+
+    /// Half widths of the plays that share the pilot, V.
+    fn half_widths(&self) -> [f64; PLAYS] {
+        from_fn(|k| self.play * (1.0 + self.play_spread * (2.0 * k as f64 / (PLAYS - 1) as f64 - 1.0)))
+    }
 }
 
-/// Where the pilot is: behind its play, and behind its stiction, V.
+/// Where the pilot is: behind each of its plays, of which it follows the mean, and behind its stiction, V.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Pilot {
-    behind_play: f64,
+    behind_play: [f64; PLAYS],
     stuck_at: f64,
     /// How long the command has been steep since the pilot broke loose, s, negative where it falls; 0 where it is not.
     steep: f64,
@@ -244,14 +255,14 @@ struct Pilot {
 
 impl Pilot {
     fn at_rest(slack: &Slack, command: f64) -> Self {
-        let position = command + slack.play * slack.start;
-        Self { behind_play: position, stuck_at: position, steep: 0.0 }
+        let behind_play = slack.half_widths().map(|half_width| command + half_width * slack.start);
+        Self { behind_play, stuck_at: command + slack.play * slack.start, steep: 0.0 }
     }
 
     /// Follows a line of the command, and tells the lines that come of it.
     fn follow(&mut self, slack: &Slack, line: Line, mut tell: impl FnMut(Line)) {
         let Self { behind_play, stuck_at, steep } = self;
-        follow_with_play(behind_play, slack.play, line, |line| {
+        follow_with_plays(behind_play, slack.half_widths(), line, |line| {
             if slack.stiction > 0.0 {
                 let threshold = slack.stiction + slack.jump_time * line.slope.abs();
                 follow_with_stiction(stuck_at, steep, threshold, line, &mut tell);
@@ -262,21 +273,32 @@ impl Pilot {
     }
 }
 
-/// Play: the position moves only where the line pushes it.
-fn follow_with_play(position: &mut f64, half_width: f64, line: Line, mut tell: impl FnMut(Line)) {
-    // Not `clamp`, which panics where a derivative tries a width below zero.
-    *position = position.max(line.value - half_width).min(line.value + half_width);
+/// Plays side by side: each position moves only where the line pushes it, and their mean is told.
+fn follow_with_plays(positions: &mut [f64; PLAYS], half_widths: [f64; PLAYS], line: Line, mut tell: impl FnMut(Line)) {
     let direction = if line.slope < 0.0 { -1.0 } else { 1.0 };
-    // Until the pushing flank has come to the position.
-    let gap = direction * (*position - line.value) + half_width;
-    let rest = if line.slope == 0.0 { f64::INFINITY } else { gap / line.slope.abs() };
-    if rest > SAME_INSTANT {
-        tell(Line { span: line.span.min(rest), value: *position, slope: 0.0, ..line });
+    // Until the pushing flank has come to each position.
+    let rests: [f64; PLAYS] = from_fn(|k| {
+        // Not `clamp`, which panics where a derivative tries a width below zero.
+        positions[k] = positions[k].max(line.value - half_widths[k]).min(line.value + half_widths[k]);
+        let gap = direction * (positions[k] - line.value) + half_widths[k];
+        if line.slope == 0.0 { f64::INFINITY } else { gap / line.slope.abs() }
+    });
+    let is_pushed = |k: usize, after: f64| rests[k] <= after + SAME_INSTANT;
+    let mut from = 0.0;
+    while from < line.span {
+        let later = rests.into_iter().filter(|rest| *rest > from + SAME_INSTANT && *rest < line.span - SAME_INSTANT);
+        let until = later.fold(line.span, f64::min);
+        let pushed = (0..PLAYS).filter(|k| is_pushed(*k, from)).count();
+        let position = |k: usize| {
+            if is_pushed(k, from) { line.at(from) - direction * half_widths[k] } else { positions[k] }
+        };
+        let value = (0..PLAYS).map(position).sum::<f64>() / PLAYS as f64;
+        let slope = line.slope * (pushed as f64 / PLAYS as f64);
+        tell(Line { start: line.start + from, span: until - from, value, slope });
+        from = until;
     }
-    if rest < line.span - SAME_INSTANT {
-        let pushed = line.from(if rest > SAME_INSTANT { rest } else { 0.0 });
-        tell(Line { value: pushed.value - direction * half_width, ..pushed });
-        *position = line.at(line.span) - direction * half_width;
+    for k in (0..PLAYS).filter(|k| rests[*k] < line.span - SAME_INSTANT) {
+        positions[k] = line.at(line.span) - direction * half_widths[k];
     }
 }
 
@@ -433,9 +455,11 @@ impl Memory for PlantMemory {
     }
 
     fn save(&self, saved: &mut Vec<f64>) {
-        let pilot = self.pilot.map(|pilot| [pilot.behind_play, pilot.stuck_at, pilot.steep]);
-        saved.push(f64::from(u8::from(pilot.is_some())));
-        saved.extend(pilot.into_iter().flatten());
+        saved.push(f64::from(u8::from(self.pilot.is_some())));
+        if let Some(Pilot { behind_play, stuck_at, steep }) = self.pilot {
+            saved.extend(behind_play);
+            saved.extend([stuck_at, steep]);
+        }
         self.command.save(saved);
         self.contraction.save(saved);
     }
@@ -443,8 +467,10 @@ impl Memory for PlantMemory {
     fn load(saved: &[f64]) -> Option<Self> {
         let (pilot, rest) = match saved {
             [0.0, rest @ ..] => (None, rest),
-            [1.0, behind_play, stuck_at, steep, rest @ ..] => {
-                (Some(Pilot { behind_play: *behind_play, stuck_at: *stuck_at, steep: *steep }), rest)
+            [1.0, rest @ ..] => {
+                let (behind_play, rest) = rest.split_first_chunk()?;
+                let (&[stuck_at, steep], rest) = rest.split_first_chunk()?;
+                (Some(Pilot { behind_play: *behind_play, stuck_at, steep }), rest)
             }
             _ => return None,
         };

@@ -208,9 +208,10 @@ fn a_saved_memory_that_cannot_be_is_refused() {
         for length in 0..saved.len() {
             quiet.restore(&saved[..length]).unwrap_err();
         }
-        // The end of the fixed part: whether there is a pilot, and after it the number of pieces.
+        // The end of the fixed part: whether there is a pilot, and after its seven numbers that of the pieces.
+        let (pilot, pieces) = (fixed - 3, fixed + 5);
         for (position, value) in
-            [(fixed - 3, 2.0), (fixed + 1, 1e9), (fixed + 1, 0.5), (fixed + 1, -1.0), (saved.len() - 1, f64::NAN)]
+            [(pilot, 2.0), (pieces, 1e9), (pieces, 0.5), (pieces, -1.0), (saved.len() - 1, f64::NAN)]
         {
             let mut damaged = saved.clone();
             damaged[position] = value;
@@ -278,6 +279,7 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
         ("valve_lag.emptying_excess", 0.5),
         ("valve_resonance.damping_ratio", 0.2),
         ("valve_resonance.stiffening", 0.5),
+        ("valve_dead_band.play_spread", 0.5),
         ("valve_dead_band.start", 1.0),
         ("supply_saturation.rounding", 1e5),
         ("supply_saturation.droop", 0.5),

@@ -91,6 +91,7 @@ fn effects_agree_with_scipy() {
         ("dead_time", &[("valve_dead_time.delay", 0.0373)]),
         ("uneven_dead_time", &[("valve_dead_time.delay", 0.0373), ("valve_dead_time.falling_excess", 0.5)]),
         ("play", &[("valve_dead_band.play", 0.11)]),
+        ("spread_play", &[("valve_dead_band.play", 0.11), ("valve_dead_band.play_spread", 0.8)]),
         ("stiction", &[("valve_dead_band.stiction", 0.17)]),
         ("late_stiction", &[("valve_dead_band.stiction", 0.17), ("valve_dead_band.jump_time", 0.01)]),
         ("overlap", &[("valve_dead_band.pressure_overlap", 6e3), ("valve_dead_band.overlap_steepness", 3.0)]),

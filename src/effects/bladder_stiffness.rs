@@ -40,7 +40,10 @@ impl Effect for BladderStiffness {
         holds: Holds::AsLaw,
         forms: &[
             &[("bladder_stiffness.relative_change", &[0.15, -0.15, 0.03, -0.03])],
-            &[("bladder_stiffness.added_force", &[60.0, -60.0, 12.0, -12.0]), ("bladder_stiffness.added_growth", &[0.3])],
+            &[
+                ("bladder_stiffness.added_force", &[60.0, -60.0, 12.0, -12.0]),
+                ("bladder_stiffness.added_growth", &[0.3]),
+            ],
         ],
         refinements: &[("bladder_stiffness.change_with_contraction", &[0.1])],
     };

@@ -313,6 +313,7 @@ macro_rules! effects {
                 $(
                     let slack = self.$field.slack();
                     all.play += slack.play;
+                    all.play_spread += slack.play_spread;
                     all.stiction += slack.stiction;
                     all.jump_time += slack.jump_time;
                     all.start += slack.start;

@@ -5,7 +5,8 @@ crate::variables::variables! {
     /// A pilot stage that does not follow small changes of the command.
     ///
     /// # Model
-    /// Play: the pilot w moves only where the command u pushes it, |u − w| ≤ `play`. Stiction: it rests until
+    /// Play: the pilot w moves only where the command u pushes it, |u − w| ≤ `play`; with `play_spread` d it is the mean of five
+    /// plays from 1 − d to 1 + d times as wide, as dry friction at a spring that sets in gradually. Stiction: it rests until
     /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`. Overlap: the spool opens no port while the
     /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
     /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
@@ -24,6 +25,8 @@ crate::variables::variables! {
     pub struct ValveDeadBand in "valve_dead_band." as Tunable {
         /// Half width of the play of the pilot
         play: f64 = 0.0, VOLT, (0.0..=2.0);
+        /// By which share of its mean the play's width differs at most
+        play_spread: f64 = 0.0, ONE, (0.0..=1.0);
         /// Deviation from the command at which a stuck pilot jumps to it
         stiction: f64 = 0.0, VOLT, (0.0..=2.0);
         /// How long a jump of a stuck pilot takes
@@ -59,6 +62,7 @@ impl Effect for ValveDeadBand {
         holds: Holds::ButForChance,
         forms: &[
             &[("valve_dead_band.play", &[0.03, 0.08, 0.15])],
+            &[("valve_dead_band.play", &[0.03, 0.08, 0.15]), ("valve_dead_band.play_spread", &[0.7])],
             &[("valve_dead_band.stiction", STICTION_STARTS)],
             &[("valve_dead_band.pressure_overlap", &[5e3])],
             &[("valve_dead_band.pressure_overlap", &[3e3, 8e3, 2e4]), ("valve_dead_band.overlap_steepness", &[10.0])],
@@ -71,7 +75,8 @@ impl Effect for ValveDeadBand {
     }
 
     fn slack(&self) -> Slack {
-        Slack { play: self.play, stiction: self.stiction, jump_time: self.jump_time, start: self.start }
+        let Self { play, play_spread, stiction, jump_time, start, .. } = *self;
+        Slack { play, play_spread, stiction, jump_time, start }
     }
 
     fn target_pressure(&self, at: &Point, _own: &[f64], target: f64) -> f64 {

@@ -715,6 +715,7 @@ SINCE_HELD = [
     SettlingZero,
     ShortMiddle,
     ShutNearTarget,
+    SoftPlay,
     SteepFriction,
     Throttle,
     TwoMorePoles,

@@ -199,7 +199,8 @@ class UnevenDeadTime(Plant):
 
 
 class Play(Plant):
-    HALF = 0.11
+    def __init__(self, half=0.11):
+        self.half = half
 
     def seen(self, command):
         """Every straight piece is cut where the gap closes: there the position begins or ends to follow."""
@@ -207,13 +208,26 @@ class Play(Plant):
         for t0, t1, u, s in super().seen(command):
             cuts = [t0, t1]
             if s != 0:
-                cuts += [t for t in (t0 + (position + sign * self.HALF - u) / s for sign in (-1, 1)) if t0 < t < t1]
+                cuts += [t for t in (t0 + (position + sign * self.half - u) / s for sign in (-1, 1)) if t0 < t < t1]
             for a, b in zip(sorted(cuts)[:-1], sorted(cuts)[1:]):
                 middle = u + s * ((a + b) / 2 - t0)
-                held = abs(middle - position) <= self.HALF + 1e-12
-                at = lambda t: u + s * (t - t0) - np.sign(s) * self.HALF
+                held = abs(middle - position) <= self.half + 1e-12
+                at = lambda t: u + s * (t - t0) - np.sign(s) * self.half
                 result.append((a, b, position, 0.0) if held else (a, b, at(a), s))
                 position = position if held else at(b)
+        return result
+
+
+class SpreadPlay(Plant):
+    """The mean of plays of five widths."""
+
+    def seen(self, command):
+        each = [Play(share * 0.11).seen(command) for share in (0.2, 0.6, 1.0, 1.4, 1.8)]
+        cuts = sorted({cut for pieces in each for piece in pieces for cut in piece[:2]})
+        result = []
+        for a, b in zip(cuts[:-1], cuts[1:]):
+            now = [next(piece for piece in pieces if piece[0] <= (a + b) / 2 <= piece[1]) for pieces in each]
+            result.append((a, b, np.mean([u + s * (a - t0) for t0, _, u, s in now]), np.mean([s for *_, s in now])))
         return result
 
 
@@ -348,6 +362,7 @@ CASES = [
     Case("resonance", Resonance(), STAIRS),
     Case("dead_time", DeadTime(), RAMPS),
     Case("play", Play(), RAMPS),
+    Case("spread_play", SpreadPlay(), RAMPS),
     Case("stiction", Stiction(), RAMPS),
     Case("late_stiction", LateStiction(), RAMPS),
     Case("overlap", Overlap(), STAIRS),
