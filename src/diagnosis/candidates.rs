@@ -160,8 +160,8 @@ impl Hypothesis {
 
     /// A model with the effects as they are at work in another one.
     pub fn at_work_in(&self, model: &Parameters, other: &Parameters) -> Parameters {
-        let variables = self.variables();
-        let values: Vec<f64> = variables.iter().map(|variable| declared(other, variable.name).1).collect();
+        let freed = self.parts.iter().flat_map(|part| part.freed());
+        let (variables, values): (Vec<_>, Vec<_>) = freed.map(|(name, _)| declared(other, name)).unzip();
         with_values(model, &variables, &values)
     }
 

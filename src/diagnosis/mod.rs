@@ -224,7 +224,7 @@ fn answer(
         squares.sum::<f64>().sqrt()
     };
     // Corrections that do not help on unseen samples are not made.
-    if chosen.model.hypothesis.parts.is_empty() && weighted(&extended_errors) > weighted(&nominal_errors) {
+    if !chosen.names_causes() && weighted(&extended_errors) > weighted(&nominal_errors) {
         (extended, extended_errors, left) = (*nominal, nominal_errors.clone(), nominal_residuals);
     }
     let (before, after) = (weighted(&nominal_errors), weighted(&extended_errors));

@@ -196,12 +196,11 @@ impl<'a, 'b> Search<'a, 'b> {
         let starts = self.starts(done);
         let from = best_of_each(&starts);
         let mut singles = self.fitted(&self.baseline, starts, FITTED.0);
-        if let Some(best) = singles.first().filter(|best| best.evidence > LEAST_EVIDENCE) {
-            let residuals = best.fitted.residuals.clone();
-            singles = self.judged_anew(&residuals, singles);
+        if singles.first().is_some_and(|best| best.evidence > LEAST_EVIDENCE) {
+            singles = self.judged_anew(singles);
         }
         let singles = if self.may_show() { self.refined_best(singles) } else { singles };
-        self.go_on(vec![singles.clone()], singles, &from)
+        self.go_on(singles.clone(), singles, &from)
     }
 
     /// Finds causes beside those that another search named, which let coefficients be off otherwise.
@@ -211,14 +210,14 @@ impl<'a, 'b> Search<'a, 'b> {
             let start = fitted.hypothesis.at_work_in(&self.baseline.parameters, &fitted.parameters);
             Some(self.finished(self.judge(self.bench.rough_fit(&fitted.hypothesis, &start)?)))
         };
-        let first = [&known.model].into_iter().chain(&known.rivals).filter_map(anew).collect::<Vec<_>>();
-        let residuals = first.first()?.fitted.residuals.clone();
-        let first = self.judged_anew(&residuals, first);
-        self.go_on(vec![first], known.singles.clone(), &from)
+        let first = [&known.model].into_iter().chain(&known.rivals).filter_map(anew).collect();
+        let first = self.judged_anew(first);
+        self.go_on(first, known.singles.clone(), &from)
     }
 
-    /// Adds levels of one effect more each while that is worth it, and chooses.
-    fn go_on(&self, mut levels: Vec<Vec<Judged>>, singles: Vec<Judged>, from: &[(Part, usize)]) -> Option<Chosen> {
+    /// Adds levels of one effect more each to a first one while that is worth it, and chooses.
+    fn go_on(&self, first: Vec<Judged>, singles: Vec<Judged>, from: &[(Part, usize)]) -> Option<Chosen> {
+        let mut levels = vec![first];
         while effects_of(levels.last()?) < MOST_EFFECTS && self.is_worth_going_on(&levels) {
             let next = self.next_level(levels.last()?, from);
             levels.push(next);
@@ -226,9 +225,10 @@ impl<'a, 'b> Search<'a, 'b> {
         self.choose(&levels, singles)
     }
 
-    /// Judges fits again with what the residuals of a better model show of the noise.
-    fn judged_anew(&mut self, residuals: &[f64], fits: Vec<Judged>) -> Vec<Judged> {
-        self.bench.refine_noise(residuals);
+    /// Judges fits again with what the first of them shows of the noise.
+    fn judged_anew(&mut self, fits: Vec<Judged>) -> Vec<Judged> {
+        let Some(first) = fits.first() else { return fits };
+        self.bench.refine_noise(&first.fitted.residuals);
         let anew = |mut fitted: Fitted| {
             fitted.losses = self.bench.data.losses(&fitted.residuals, Scope::All);
             fitted
