@@ -128,7 +128,8 @@ fn rigid_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
     let pressure = effects.effective_pressure(at, at.gauge_pressure);
     let contraction = effects.effective_contraction(at, own, at.contraction);
     let of_area = effects.area_force(at, own, force_models.pressure_force(muscle, pressure, contraction));
-    let elastic = effects.elastic_force(at, own, force_models.elastic_force(muscle, contraction));
+    let of_membrane = effects.elastic_contraction(at, own, contraction);
+    let elastic = effects.elastic_force(at, own, force_models.elastic_force(muscle, of_membrane));
     let static_force = effects.static_force(of_area + elastic);
     let velocity = at.contraction_velocity;
     let resistance = force_models.resistance(muscle, pressure, contraction, velocity);
@@ -173,9 +174,11 @@ fn nominal_pressure_rate(parameters: &Parameters, command: f64, gauge_pressure: 
     parameters.valve.bandwidth * (parameters.valve.target_pressure(command) - gauge_pressure)
 }
 
-/// Mass in kg that moves.
-fn moving_mass(parameters: &Parameters) -> f64 {
-    parameters.effects.mass(parameters.load.mass)
+/// Masses in kg that weigh and that move.
+#[inline]
+fn masses(parameters: &Parameters) -> (f64, f64) {
+    let weighing = parameters.effects.mass(parameters.load.mass);
+    (weighing, parameters.effects.inertia(weighing))
 }
 
 /// Point of a muscle at rest, its valve asking for the pressure that is there.
@@ -295,7 +298,7 @@ impl System for PneumaticMuscle {
     const SCALE: Self::State = Extended(Effects::scales(&[1e5, 0.1, 0.1]));
 
     fn initial_state(parameters: &Parameters, inputs: &MuscleInputs) -> Result<Self::State> {
-        let (mass, gauge_pressure) = (moving_mass(parameters), parameters.initial.gauge_pressure);
+        let ((mass, _), gauge_pressure) = (masses(parameters), parameters.initial.gauge_pressure);
         let hanging = equilibrium(parameters, gauge_pressure, mass * GRAVITY + inputs.external_force);
         let contraction = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
         let mut state = [0.0; HANGING_STATES];
@@ -311,7 +314,8 @@ impl System for PneumaticMuscle {
         let force = muscle_force(parameters, &at, own);
         rates.0[0] = pressure_rate(parameters, &at, own);
         rates.0[1] = at.contraction_velocity;
-        rates.0[2] = (force - inputs.external_force) / moving_mass(parameters) - GRAVITY;
+        let (weighing, moving) = masses(parameters);
+        rates.0[2] = (force - inputs.external_force) / moving - GRAVITY * (weighing / moving);
         parameters.effects.rates(&with_pull(parameters, &at), own, &mut rates.0[3..]);
     }
 
@@ -347,7 +351,8 @@ impl System for PneumaticMuscle {
     }
 
     fn left_range(parameters: &Parameters, state: &Self::State) -> Option<&'static str> {
-        if moving_mass(parameters) <= 0.0 {
+        let (weighing, moving) = masses(parameters);
+        if weighing <= 0.0 || moving <= 0.0 {
             return Some("load.mass with payload_mass");
         }
         let length = parameters.muscle.rest_length - state.0[1];

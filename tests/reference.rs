@@ -64,6 +64,16 @@ fn effects_agree_with_scipy() {
             &[("creep.amplitude_1", 0.1), ("creep.time_1", 1.5), ("creep.amplitude_2", 0.05), ("creep.time_2", 8.0)],
         ),
         ("uneven_creep", &[("creep.amplitude_1", 0.1), ("creep.time_1", 1.5), ("creep.return_ratio", 2.0)]),
+        (
+            "known_creep",
+            &[
+                ("creep.amplitude_1", 0.1),
+                ("creep.time_1", 1.5),
+                ("creep.relaxed_share", 0.0),
+                ("creep.settled_share", 1.0),
+                ("creep.nominal_share", 0.5),
+            ],
+        ),
         ("pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5)]),
         ("resonance", &[("valve_resonance.natural_frequency", 25.0), ("valve_resonance.damping_ratio", 0.35)]),
         (
@@ -118,6 +128,24 @@ fn effects_agree_with_scipy() {
         ),
         ("leakage", &[("leakage.rate", 0.8), ("leakage.choked_share", 0.4), ("leakage.volume_growth", 0.4)]),
         ("lifting_seal", &[("leakage.rate", 0.8), ("leakage.opening_pressure", 0.9e5), ("leakage.volume_growth", 0.4)]),
+        (
+            "small_tank",
+            &[
+                ("supply_saturation.gauge_pressure", 1.85e5),
+                ("supply_saturation.usage", 4.0),
+                ("supply_saturation.recovery_time", 2.5),
+            ],
+        ),
+        ("wrong_bore", &[("force_gain.relative_error", 0.08), ("force_gain.elastic_share", 0.5)]),
+        (
+            "stiff_ends",
+            &[
+                ("end_effects.excess", 0.06),
+                ("end_effects.low_pressure_excess", 0.1),
+                ("end_effects.elastic_share", 0.25),
+            ],
+        ),
+        ("counterweight", &[("payload_mass.additional_mass", -3.0), ("payload_mass.inertia", 6.0)]),
         ("series_elasticity", &[("series_elasticity.compliance", -8e-6), ("series_elasticity.exponent", 0.85)]),
         (
             "threshold",

@@ -217,7 +217,8 @@ impl<'a> Chain<'a> {
         let contraction = self.true_contraction()?;
         let effects = &self.parameters.effects;
         let needed = parabolas(&self.recording.time, &contraction).zip(&contraction).map(|(motion, contraction)| {
-            let force = effects.mass(mass) * (GRAVITY + motion.curvature);
+            let weighing = effects.mass(mass);
+            let force = weighing * GRAVITY + effects.inertia(weighing) * motion.curvature;
             (contraction, force)
         });
         let time = self.since_start();

@@ -170,11 +170,10 @@ pub fn diagnose(
     let ways = Off::of(nominal);
     let (mut bench, mut chosen) = searched(ways[0], None)?.ok_or_else(cannot_follow)?;
     // Coefficients that are each off by themselves can stand for a good part of a further cause.
-    if let Some(off) = ways.get(1).filter(|_| chosen.leaves_something(&bench.data)) {
-        let other = searched(*off, Some(&chosen).filter(|chosen| chosen.names_causes()))?;
-        if let Some(better) = other.filter(|(_, other)| other.adds_to(&chosen, &bench.data)) {
-            (bench, chosen) = better;
-        }
+    if let Some(off) = ways.get(1).filter(|_| chosen.leaves_something(&bench.data))
+        && let Some(better) = searched(*off, Some(&chosen))?.filter(|(_, other)| other.adds_to(&chosen, &bench.data))
+    {
+        (bench, chosen) = better;
     }
     answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
 }

@@ -152,9 +152,9 @@ impl Chosen {
         !self.model.hypothesis.parts.is_empty()
     }
 
-    /// Whether something is wrong of which the model leaves more than noise.
+    /// Whether the named causes leave more than noise.
     pub fn leaves_something(&self, data: &Data) -> bool {
-        self.verdict != Verdict::Nominal && is_unsound(&data.losses(&self.model.residuals, Scope::All), data)
+        self.names_causes() && is_unsound(&data.losses(&self.model.residuals, Scope::All), data)
     }
 
     /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither fit
@@ -200,25 +200,28 @@ impl<'a, 'b> Search<'a, 'b> {
             singles = self.judged_anew(singles);
         }
         let singles = if self.may_show() { self.refined_best(singles) } else { singles };
-        self.go_on(singles.clone(), singles, &from)
+        self.go_on(vec![singles.clone()], singles, &from)
     }
 
-    /// Finds causes beside those that another search named, which let coefficients be off otherwise.
+    /// Finds causes beside those that another search named, which let coefficients be off otherwise; `None` where that is not
+    /// worth it.
     pub fn run_beside(mut self, known: &Chosen, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
-        let from = best_of_each(&self.starts(done));
         let anew = |fitted: &Fitted| {
             let start = fitted.hypothesis.at_work_in(&self.baseline.parameters, &fitted.parameters);
             Some(self.finished(self.judge(self.bench.rough_fit(&fitted.hypothesis, &start)?)))
         };
         let first = [&known.model].into_iter().chain(&known.rivals).filter_map(anew).collect();
-        let first = self.judged_anew(first);
-        self.go_on(first, known.singles.clone(), &from)
+        let levels = vec![self.judged_anew(first)];
+        if !self.is_worth_going_on(&levels) {
+            return None;
+        }
+        let from = best_of_each(&self.starts(done));
+        self.go_on(levels, known.singles.clone(), &from)
     }
 
-    /// Adds levels of one effect more each to a first one while that is worth it, and chooses.
-    fn go_on(&self, first: Vec<Judged>, singles: Vec<Judged>, from: &[(Part, usize)]) -> Option<Chosen> {
-        let mut levels = vec![first];
-        while effects_of(levels.last()?) < MOST_EFFECTS && self.is_worth_going_on(&levels) {
+    /// Adds levels of one effect more each while that is worth it, and chooses.
+    fn go_on(&self, mut levels: Vec<Vec<Judged>>, singles: Vec<Judged>, from: &[(Part, usize)]) -> Option<Chosen> {
+        while self.is_worth_going_on(&levels) {
             let next = self.next_level(levels.last()?, from);
             levels.push(next);
         }
@@ -280,14 +283,14 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     /// The same, those that are carried on with their last effect, and the very best with all of its effects, refined and
-    /// fitted to the end: what a fit left undone would else be credited to the next effect. Where the very best leaves nothing
-    /// to look for, only those that may rival it are, with all of theirs.
+    /// fitted to the end: what a fit left undone would else be credited to the next effect. So are those that may rival the very
+    /// best; where that leaves nothing to look for, only those are, with all of theirs.
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
         let Some(best) = others.next().map(|(_, best)| self.in_best_form(best)) else { return Vec::new() };
         let may_be_form = self.may_be_form(&best.fitted.losses);
-        let is_close = |(rank, _): &(usize, Judged)| if may_be_form { &rivals } else { &ranks }.contains(rank);
+        let is_close = |(rank, _): &(usize, Judged)| rivals.contains(rank) || !may_be_form && ranks.contains(rank);
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
         let refined = close.into_par_iter().map(|(_, judged)| {
@@ -358,12 +361,15 @@ impl<'a, 'b> Search<'a, 'b> {
         Some(self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &start)?))
     }
 
-    /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect.
+    /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect: of what the
+    /// form of one cause may leave it is worth a second one, but what the forms of two may leave is not worth a third.
     fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
         let most = levels.last().map_or(0, |level| effects_of(level));
         let leading = self.leading(levels).filter(|best| best.fitted.hypothesis.parts.len() == most);
-        leading.is_some_and(|best| is_unsound(&best.fitted.losses, &self.bench.data))
-            && !self.is_sound(&self.baseline.losses)
+        let asks_for_more = |best: &Judged| {
+            is_unsound(&best.fitted.losses, &self.bench.data) && (most == 1 || !self.may_be_form(&best.fitted.losses))
+        };
+        most < MOST_EFFECTS && leading.is_some_and(asks_for_more) && !self.is_sound(&self.baseline.losses)
     }
 
     /// Whether residuals are small enough to be those of forms, which are never known exactly.

@@ -4,9 +4,10 @@ crate::variables::variables! {
     /// Creep: the membrane gives way slowly, or settles into the braid slowly.
     ///
     /// # Model
-    /// The membrane feels x − d₁ − d₂, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
+    /// The membrane feels x − d₁ − d₂ + n (a₁ + a₂) x, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
     /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing
-    /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The pressure pulls by d_F more, with
+    /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The nominal coefficients have the share n of it already, `nominal_share`: all of
+    /// it if they are those of a muscle at rest. The pressure pulls by d_F more, with
     /// τ₁ dd_F/dt + d_F = a_F (A p − A(0) p(0)), `pull_amplitude` a_F. While a drift goes back, its time is `return_ratio` τ.
     /// A standard linear solid is stiffer for fast changes: springs kᵢ in parallel with the membrane, `relaxing_stiffness_1` and
     /// `relaxing_stiffness_2`, pull back with kᵢ eᵢ, deᵢ/dt = dx/dt − eᵢ/τᵢ, with `return_ratio` τᵢ while eᵢ < 0.
@@ -37,6 +38,8 @@ crate::variables::variables! {
         relaxed_share: f64 = 1.0, ONE, (0.0..=1.0);
         /// Share of the remaining drift that lies before the start
         settled_share: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Share of the drift that the nominal coefficients have already
+        nominal_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Drift of the pull of the pressure, per pull
         pull_amplitude: f64 = 0.0, ONE, (-0.5..=1.0);
         /// Stiffness that relaxes with the first time constant
@@ -76,6 +79,7 @@ impl Effect for Creep {
             ("creep.time_2", &[15.0, 0.5]),
             ("creep.relaxed_share", &[0.5]),
             ("creep.settled_share", &[0.5]),
+            ("creep.nominal_share", &[0.3]),
             ("creep.pull_amplitude", &[0.05]),
             ("creep.return_ratio", &[1.5]),
             ("creep.relaxing_stiffness_2", &[500.0]),
@@ -119,8 +123,12 @@ impl Effect for Creep {
         force - self.relaxing_stiffness_1 * own[5] - self.relaxing_stiffness_2 * own[6]
     }
 
-    fn effective_contraction(&self, _at: &Point, own: &[f64], contraction: f64) -> f64 {
-        if self.is_neutral() { contraction } else { contraction - own[0] - own[1] }
+    fn effective_contraction(&self, at: &Point, own: &[f64], contraction: f64) -> f64 {
+        if self.is_neutral() {
+            return contraction;
+        }
+        let known = self.nominal_share * (self.amplitude_1 + self.amplitude_2);
+        contraction - own[0] - own[1] + if known == 0.0 { 0.0 } else { known * at.contraction }
     }
 
     fn sentence(&self) -> String {

@@ -8,7 +8,7 @@ crate::variables::variables! {
     ///
     /// # Model
     /// The braid feels k x in place of the contraction x, k = 1 + (c + a exp(−p/1 bar)) (1 + g (x/0.1 m − 1)): `excess` c,
-    /// `low_pressure_excess` a, `growth` g.
+    /// `low_pressure_excess` a, `growth` g. What resists elastically feels x + m (k − 1) x: `elastic_share` m.
     ///
     /// # In the data
     /// The force residual grows with the contraction and with pressure; with the rest length it shrinks.
@@ -26,6 +26,22 @@ crate::variables::variables! {
         low_pressure_excess: f64 = 0.0, ONE, (-0.5..=1.0);
         /// Relative growth of both from 0.1 m to 0.2 m of contraction
         growth: f64 = 0.0, ONE, (-1.0..=1.0);
+        /// Share of the excess that the elastic force has, too
+        elastic_share: f64 = 1.0, ONE, (0.0..=1.0);
+    }
+}
+
+impl EndEffects {
+    /// By how much the contraction counts more, m.
+    fn beyond(&self, at: &Point) -> f64 {
+        let mut excess = self.excess;
+        if self.low_pressure_excess != 0.0 {
+            excess += self.low_pressure_excess * (-at.gauge_pressure / FADE).exp();
+        }
+        if self.growth != 0.0 {
+            excess *= 1.0 + self.growth * (at.relative_contraction() - 1.0);
+        }
+        excess * at.contraction
     }
 }
 
@@ -39,7 +55,10 @@ impl Effect for EndEffects {
         reference: "Tondu and Lopez 2000; Kothera et al. 2009",
         of_load: false,
         holds: Holds::AsLaw,
-        forms: &[&[("end_effects.excess", &[0.1, 0.02, -0.02])]],
+        forms: &[
+            &[("end_effects.excess", &[0.1, 0.02, -0.02])],
+            &[("end_effects.excess", &[0.1, 0.02, -0.02]), ("end_effects.elastic_share", &[0.0])],
+        ],
         refinements: &[("end_effects.low_pressure_excess", &[0.05]), ("end_effects.growth", &[0.3])],
     };
 
@@ -48,14 +67,11 @@ impl Effect for EndEffects {
     }
 
     fn effective_contraction(&self, at: &Point, _own: &[f64], contraction: f64) -> f64 {
-        let mut excess = self.excess;
-        if self.low_pressure_excess != 0.0 {
-            excess += self.low_pressure_excess * (-at.gauge_pressure / FADE).exp();
-        }
-        if self.growth != 0.0 {
-            excess *= 1.0 + self.growth * (at.relative_contraction() - 1.0);
-        }
-        contraction + excess * at.contraction
+        contraction + self.beyond(at)
+    }
+
+    fn elastic_contraction(&self, at: &Point, _own: &[f64], contraction: f64) -> f64 {
+        if self.elastic_share == 1.0 { contraction } else { contraction - (1.0 - self.elastic_share) * self.beyond(at) }
     }
 
     fn sentence(&self) -> String {

@@ -1,17 +1,19 @@
-use super::{Description, Effect, Holds, REFERENCE_FORCE, scaled};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, scaled};
 
 crate::variables::variables! {
     /// A muscle that is stronger or weaker as a whole.
     ///
     /// # Model
-    /// F_static ← F_static (1 + g + b (F_static/400 N − 1)): `relative_error` g, `bend` b where it changes with the force.
+    /// F_static ← F_static (1 + g + b (F_static/400 N − 1)): `relative_error` g, `bend` b where it changes with the force. Of the
+    /// elastic force 1 + m g counts in place of 1 + g: `elastic_share` m.
     ///
     /// # In the data
     /// The force residual is in proportion to the force, whatever pressure and contraction; the motion goes with it,
     /// unlike with a gain of the force sensor. One load alone cannot tell it from a wrong mass.
     ///
     /// # Validity
-    /// Wrong bore or number of threads, ageing; damping and friction stay.
+    /// Wrong bore or number of threads, ageing; damping and friction stay. The area goes with the square of the bore and the
+    /// membrane with its first power, m ≈ 0.5; broken threads leave the membrane as it is, m = 0.
     ///
     /// # Reference
     /// Definition of a gain.
@@ -20,6 +22,8 @@ crate::variables::variables! {
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Change of the gain per 400 N away from 400 N: threads that stretch
         bend: f64 = 0.0, ONE, (-0.05..=0.05);
+        /// Share of the relative error that the elastic force has, too
+        elastic_share: f64 = 1.0, ONE, (0.0..=1.0);
     }
 }
 
@@ -34,11 +38,19 @@ impl Effect for ForceGain {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("force_gain.relative_error", &[0.08, -0.08, 0.02, -0.02])]],
-        refinements: &[("force_gain.bend", &[0.005])],
+        refinements: &[("force_gain.bend", &[0.005]), ("force_gain.elastic_share", &[0.5])],
     };
 
     fn is_neutral(&self) -> bool {
         self.relative_error == 0.0 && self.bend == 0.0
+    }
+
+    fn elastic_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
+        if self.elastic_share == 1.0 {
+            return force;
+        }
+        // All of it is scaled by 1 + g after this.
+        force * (1.0 + self.elastic_share * self.relative_error) / (1.0 + self.relative_error)
     }
 
     fn static_force(&self, force: f64) -> f64 {

@@ -174,6 +174,10 @@ pub trait Effect: Declared + Default {
     fn effective_contraction(&self, _at: &Point, _own: &[f64], contraction: f64) -> f64 {
         contraction
     }
+    /// Contraction in m that what resists elastically feels, where the braid feels the given one.
+    fn elastic_contraction(&self, _at: &Point, _own: &[f64], contraction: f64) -> f64 {
+        contraction
+    }
     /// Pull in N of the pressure on the virtual area.
     fn area_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
         force
@@ -194,8 +198,12 @@ pub trait Effect: Declared + Default {
     fn stretch(&self, _force: f64) -> f64 {
         0.0
     }
-    /// Moving mass in kg.
+    /// Mass in kg that weighs.
     fn mass(&self, mass: f64) -> f64 {
+        mass
+    }
+    /// Mass in kg that moves, where so much of it weighs.
+    fn inertia(&self, mass: f64) -> f64 {
         mass
     }
 
@@ -361,6 +369,10 @@ macro_rules! effects {
             chained! { "Gauge pressure in Pa that the valve goes for."; target_pressure; $($field: $Effect;)* }
             chained! { "Rate of the gauge pressure in Pa/s."; pressure_rate; $($field: $Effect;)* }
             chained! { "Contraction in m that the membrane feels."; effective_contraction; $($field: $Effect;)* }
+            chained! {
+                "Contraction in m that what resists elastically feels, where the braid feels the given one.";
+                elastic_contraction; $($field: $Effect;)*
+            }
             chained! { "Pull in N of the pressure on the virtual area."; area_force; $($field: $Effect;)* }
             chained! { "Pull in N of the elastic membrane."; elastic_force; $($field: $Effect;)* }
             chained! { "Pull of the muscle in N."; muscle_force; $($field: $Effect;)* }
@@ -392,10 +404,17 @@ macro_rules! effects {
                 0.0 $(+ self.$field.stretch(force))*
             }
 
-            /// Moving mass in kg.
+            /// Mass in kg that weighs.
             #[inline]
             pub fn mass(&self, mut mass: f64) -> f64 {
                 $(mass = self.$field.mass(mass);)*
+                mass
+            }
+
+            /// Mass in kg that moves, where so much of it weighs.
+            #[inline]
+            pub fn inertia(&self, mut mass: f64) -> f64 {
+                $(mass = self.$field.inertia(mass);)*
                 mass
             }
 

@@ -5,7 +5,8 @@ crate::variables::variables! {
     ///
     /// # Model
     /// M ← M (1 + m) + ΔM: `additional_mass` ΔM, the same with every load (a hanger that was not weighed),
-    /// `relative_error` m of what was entered (a wrong scale).
+    /// `relative_error` m of what was entered (a wrong scale). `inertia` ΔI moves along without a weight: a pulley's moment of
+    /// inertia over its radius squared, or both masses of a counterweight whose weight ΔM takes away.
     ///
     /// # In the data
     /// The force residual is in proportion to g + d²x/dt², also at rest; the resonance shifts. With one load only it
@@ -18,6 +19,8 @@ crate::variables::variables! {
         additional_mass: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
         /// Relative error of the entered mass
         relative_error: f64 = 0.0, ONE, (-0.9..=3.0);
+        /// Mass that moves along and does not weigh
+        inertia: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
     }
 }
 
@@ -25,31 +28,41 @@ impl Effect for PayloadMass {
     const DESCRIPTION: Description = Description {
         name: "payload_mass",
         meaning: "the load is not what was entered",
-        equation: "M <- M (1 + m) + dM",
+        equation: "M <- M (1 + m) + dM, of which the weight is M g and the inertia M + dI",
         signature: "force residual in proportion to g + acceleration, also at rest",
         experiment: "two known masses, static and dynamic",
         reference: "thesis eq. 5.4",
         of_load: true,
         holds: Holds::Exactly,
         forms: &[&[("payload_mass.additional_mass", &[2.0, -2.0])], &[("payload_mass.relative_error", &[0.1, -0.1])]],
-        refinements: &[("payload_mass.additional_mass", &[0.5]), ("payload_mass.relative_error", &[0.02])],
+        refinements: &[
+            ("payload_mass.additional_mass", &[0.5]),
+            ("payload_mass.relative_error", &[0.02]),
+            ("payload_mass.inertia", &[1.0]),
+        ],
     };
 
     fn is_neutral(&self) -> bool {
-        self.additional_mass == 0.0 && self.relative_error == 0.0
+        [self.additional_mass, self.relative_error, self.inertia] == [0.0; 3]
     }
 
     fn mass(&self, mass: f64) -> f64 {
         mass * (1.0 + self.relative_error) + self.additional_mass
     }
 
+    fn inertia(&self, mass: f64) -> f64 {
+        mass + self.inertia
+    }
+
     fn sentence(&self) -> String {
         let word = |change: f64| if change < 0.0 { "lighter" } else { "heavier" };
         let (mass, percent) = (self.additional_mass, 100.0 * self.relative_error);
+        let if_any = |size: f64, text: String| if size == 0.0 { String::new() } else { text };
+        let inertia = if_any(self.inertia, format!("; {:+.2} kg more move than weigh", self.inertia));
         if percent == 0.0 {
-            return format!("The load is {:.2} kg {} than entered.", mass.abs(), word(mass));
+            return format!("The load is {:.2} kg {} than entered{inertia}.", mass.abs(), word(mass));
         }
-        let beyond = if mass == 0.0 { String::new() } else { format!(", and {mass:+.2} kg") };
-        format!("The load is {:.1} % {} than entered{beyond}.", percent.abs(), word(percent))
+        let beyond = if_any(mass, format!(", and {mass:+.2} kg"));
+        format!("The load is {:.1} % {} than entered{beyond}{inertia}.", percent.abs(), word(percent))
     }
 }

@@ -2,13 +2,16 @@ use super::{Description, Effect, Holds, Point};
 
 /// Ceiling in Pa from which on there is none: beyond what any muscle stands.
 const NONE: f64 = 2e6;
+/// Time constant in s from which on nothing recovers.
+const FOREVER: f64 = 1e6;
 
 crate::variables::variables! {
     /// A supply whose pressure is too low for the command.
     ///
     /// # Model
-    /// p_target ← min(p_target, p_s − f t − d max(p_target − p, 0)): `gauge_pressure` p_s of the supply at the start, its
-    /// `fall` f over time t, its `droop` d while it fills the muscle. With `rounding` r the minimum is r-soft:
+    /// p_target ← min(p_target, p_s − s − d max(p_target − p, 0)), ds/dt = f + u max(p_target − p, 0) − s/τ: `gauge_pressure` p_s of the
+    /// supply at the start, its `fall` f over time, its `droop` d while it fills the muscle, what that takes from a small tank by
+    /// its `usage` u, and `recovery_time` τ of its compressor. With `rounding` r the minimum is r-soft:
     /// p_target − r ln(1 + exp((p_target − ceiling)/r)).
     ///
     /// # In the data
@@ -16,7 +19,7 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// A supply of constant pressure behind a regulator, or with a droop in proportion to what the muscle lacks, or a tank
-    /// that others empty steadily.
+    /// that others empty steadily, or one that the muscle itself empties.
     ///
     /// # Reference
     /// Definition of saturation; droop as in data sheets of pressure regulators (0.5 to 1.75 bar).
@@ -29,6 +32,10 @@ crate::variables::variables! {
         droop: f64 = 0.0, ONE, (0.0..=1.0);
         /// Loss of supply pressure per time, of a tank that empties or a line that others use more and more
         fall: f64 = 0.0, PASCAL_PER_SECOND, (-1e4..=1e5);
+        /// Loss of supply pressure per time and pressure that the muscle lacks: of a small tank
+        usage: f64 = 0.0, PER_SECOND, (0.0..=20.0);
+        /// Time constant in which a loss is made up for; none is at the largest value
+        recovery_time: f64 = FOREVER, SECOND, (0.3..=FOREVER);
     }
 }
 
@@ -55,6 +62,8 @@ impl Effect for SupplySaturation {
             ("supply_saturation.rounding", &[3e3]),
             ("supply_saturation.droop", &[0.01, 0.1]),
             ("supply_saturation.fall", &[300.0]),
+            ("supply_saturation.usage", &[1.0, 5.0]),
+            ("supply_saturation.recovery_time", &[10.0, 3.0]),
         ],
     };
     const STATE_SCALES: &'static [f64] = &[1e4];
@@ -63,8 +72,9 @@ impl Effect for SupplySaturation {
         self.gauge_pressure >= NONE
     }
 
-    fn rates(&self, _at: &Point, _own: &[f64], rates: &mut [f64]) {
-        rates[0] = self.fall;
+    fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
+        let taken = self.usage * (at.target_pressure - at.gauge_pressure).max(0.0);
+        rates[0] = self.fall + taken - if self.recovery_time < FOREVER { own[0] / self.recovery_time } else { 0.0 };
     }
 
     fn target_pressure(&self, at: &Point, own: &[f64], target: f64) -> f64 {

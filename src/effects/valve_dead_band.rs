@@ -62,6 +62,8 @@ impl Effect for ValveDeadBand {
         holds: Holds::ButForChance,
         forms: &[
             &[("valve_dead_band.play", &[0.03, 0.08, 0.15])],
+            // The command was raised before the recording.
+            &[("valve_dead_band.play", &[0.03, 0.08, 0.15]), ("valve_dead_band.start", &[-0.9])],
             &[("valve_dead_band.play", &[0.03, 0.08, 0.15]), ("valve_dead_band.play_spread", &[0.7])],
             &[("valve_dead_band.stiction", STICTION_STARTS)],
             &[("valve_dead_band.pressure_overlap", &[5e3])],

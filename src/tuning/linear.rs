@@ -107,7 +107,8 @@ impl LinearPlant {
         let step = 1e-4;
         let input = (rates_at(&rest, command + step)[0] - rates_at(&rest, command - step)[0]) / (2.0 * step);
         let dead_time = parameters.effects.command_delay();
-        Self { rates, input, dead_time, mass: parameters.effects.mass(parameters.load.mass) }
+        let mass = parameters.effects.inertia(parameters.effects.mass(parameters.load.mass));
+        Self { rates, input, dead_time, mass }
     }
 
     /// The plant with something in parallel to the muscle that pulls back, N/m.

@@ -700,6 +700,7 @@ SINCE_HELD = [
     CreepOfPull,
     DampingOfContraction,
     DampingOfPressure,
+    EmptyingTank,
     FallingCeiling,
     FungBladder,
     KneedGain,

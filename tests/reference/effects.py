@@ -24,6 +24,7 @@ class Plant:
     """The nominal plant; effects override what they change. States: pressure, contraction, velocity, own ones."""
 
     own_scales = ()
+    weighing = moving = MASS
 
     def own_start(self, x):
         return []
@@ -81,6 +82,21 @@ class UnevenCreep(Plant):
 
     def static_force(self, pressure, x, own):
         return super().static_force(pressure, x - own[0], own)
+
+
+class KnownCreep(Plant):
+    """Settled at the start from the rest length, with coefficients that were identified halfway."""
+
+    own_scales = (0.1,)
+
+    def own_start(self, x):
+        return [0.1 * x]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(0.1 * x - own[0]) / 1.5]
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x - own[0] + 0.05 * x, own)
 
 
 class PullCreep(Plant):
@@ -301,6 +317,44 @@ class LiftingSeal(Plant):
         return VALVE_BANDWIDTH * (target - pressure) - 0.8 * max(pressure - 0.9e5, 0.0) / (1 + 4 * x)
 
 
+class SmallTank(Plant):
+    """A tank of 1.85 bar gives what the muscle takes in, a third of its volume, and is filled again within 2.5 s."""
+
+    own_scales = (1e5,)
+
+    def own_start(self, x):
+        return [1.85e5]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        filling = max(min(target, own[0]) - pressure, 0.0)
+        return [(1.85e5 - own[0]) / 2.5 - 4.0 * filling]
+
+    def pressure_rate(self, target, pressure, x, own):
+        return VALVE_BANDWIDTH * (min(target, own[0]) - pressure)
+
+
+class WrongBore(Plant):
+    """8 % stronger threads, 4 % more membrane."""
+
+    def static_force(self, pressure, x, own):
+        return 1.08 * pressure * VIRTUAL_AREA_1000.area(x) + 1.04 * VIRTUAL_AREA_1000.elastic_force(x)
+
+
+class StiffEnds(Plant):
+    """The middle of the braid contracts more, and the membrane along its whole length a quarter of that more."""
+
+    def static_force(self, pressure, x, own):
+        braid = x * (1 + 0.06 + 0.1 * np.exp(-pressure / 1e5))
+        membrane = x + 0.25 * (braid - x)
+        return pressure * VIRTUAL_AREA_1000.area(braid) + VIRTUAL_AREA_1000.elastic_force(membrane)
+
+
+class Counterweight(Plant):
+    """3 kg on the other side of a pulley: they take from the weight and add to what moves."""
+
+    weighing, moving = MASS - 3.0, MASS + 3.0
+
+
 class SeriesElasticity(Plant):
     def readings(self, x, force, own):
         return x - 8e-6 * 400 * (force / 400) ** 0.85
@@ -353,6 +407,7 @@ class Case:
 CASES = [
     Case("creep", Creep(), STAIRS),
     Case("uneven_creep", UnevenCreep(), STAIRS),
+    Case("known_creep", KnownCreep(), STAIRS),
     Case("pull_creep", PullCreep(), STAIRS),
     Case("relaxation", Relaxation(), STAIRS),
     Case("regulator", Regulator(), STAIRS),
@@ -370,6 +425,10 @@ CASES = [
     Case("nozzle", Nozzle(), STAIRS),
     Case("leakage", Leakage(), STAIRS),
     Case("lifting_seal", LiftingSeal(), STAIRS),
+    Case("small_tank", SmallTank(), STAIRS),
+    Case("wrong_bore", WrongBore(), STAIRS),
+    Case("stiff_ends", StiffEnds(), STAIRS),
+    Case("counterweight", Counterweight(), STAIRS),
     Case("series_elasticity", SeriesElasticity(), RAMPS),
     Case("threshold", Threshold(), STAIRS),
     Case("friction", Friction(), RAMPS),
@@ -380,7 +439,7 @@ CASES = [
 def start(case):
     """The load hangs still at the pressure that the first command asks for."""
     pressure, plant = VALVE_GAIN * case.command[0], case.plant
-    surplus = lambda x: plant.force(pressure, x, 0.0, plant.own_start(x)) - MASS * GRAVITY
+    surplus = lambda x: plant.force(pressure, x, 0.0, plant.own_start(x)) - plant.weighing * GRAVITY
     x = brentq(surplus, 0.0, 0.22, xtol=1e-15, rtol=1e-15)
     return np.array([pressure, x, 0.0, *plant.own_start(x)])
 
@@ -396,7 +455,7 @@ def solve(case):
     def derivative(t, state, t0, value, slope):
         pressure, x, velocity, *own = state
         target = VALVE_GAIN * (value + slope * (t - t0))
-        push = plant.force(pressure, x, velocity, own) / MASS - GRAVITY
+        push = (plant.force(pressure, x, velocity, own) - plant.weighing * GRAVITY) / plant.moving
         own_rates = plant.own_rates(target, pressure, x, velocity, own)
         return [plant.pressure_rate(target, pressure, x, own), velocity, push, *own_rates]
 
