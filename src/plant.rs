@@ -262,7 +262,7 @@ pub fn equilibrium(parameters: &Parameters, gauge_pressure: f64, weight: f64) ->
 ///
 /// # Model
 /// dp/dt = ω (K_v u − p); F = p A(x) + F_e(x) − B v; M dv/dt = F − M g − F_ext; the effects act on u, ω, dp/dt, on what
-/// the muscle feels of p and x, on both parts of F, on M, and on what the sensors show.
+/// the muscle feels of p and x, on both parts of F, on M that weighs and M that moves, and on what the sensors show.
 ///
 /// # Reference
 /// Thesis eqs. 4.5, 5.3, 5.4.

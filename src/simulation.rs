@@ -332,7 +332,7 @@ impl ClosedLoop {
 /// The parameters with the initial pressure at which the load hangs still where the reference starts.
 pub fn at_rest_on_reference(parameters: &Parameters) -> Parameters {
     let mut parameters = *parameters;
-    let weight = parameters.load.mass * GRAVITY;
+    let weight = parameters.effects.mass(parameters.load.mass) * GRAVITY;
     parameters.initial.gauge_pressure = resting_pressure(&parameters, parameters.reference.start, weight);
     parameters
 }

@@ -8,7 +8,7 @@
 //! |---|---|---|---|
 //! | [`Link::Valve`] | u | p | p − p̂(u), the valve started at the first measured pressure |
 //! | [`Link::Muscle`] | p, x | F | F − F̂(p, x, dx/dt), [`replay_muscle`] |
-//! | [`Link::Load`] | x | F | ⟨F⟩ − M (g + d²x/dt²): the force that the motion of the load takes |
+//! | [`Link::Load`] | x | F | ⟨F⟩ − M g − I d²x/dt², I what moves of the load: the force that the motion of the load takes |
 //! | [`Link::Reading`] | p, F | x | (F − F̂) / \|∂F̂/∂x\|: how far the reading of x is from where F belongs, to first order |
 //! | [`Link::Whole`] | u | x or F | measured − [`replay`] |
 //!
@@ -110,7 +110,7 @@ impl Link {
         match self {
             Self::Valve => "Measured gauge pressure − pressure that the valve makes of the command.",
             Self::Muscle => "Measured force − force of the muscle at the measured pressure and contraction.",
-            Self::Load => "Measured force − force that the measured motion of the load takes, M (g + a).",
+            Self::Load => "Measured force − force that the measured motion of the load takes, M g + I a.",
             Self::Reading => "Measured contraction − contraction that the measured pressure and force belong to.",
             Self::Whole(_) => "Measured − simulated from the inputs of the experiment alone, every link in it.",
         }

@@ -140,7 +140,7 @@ pub struct Diagnosis {
 /// Diagnoses recordings against a nominal model.
 ///
 /// `tolerance` is the relative error of the nominal coefficients below which nothing is called wrong; `done` is told
-/// after each of the `1 + candidates` fits, of which there may be two rounds.
+/// after each of the `1 + candidates` fits, of which there may be two rounds, the second perhaps without its candidates.
 ///
 /// # Errors
 /// [`Error::Recording`] where nothing can be compared; errors of the simulation of the nominal model.
@@ -185,7 +185,8 @@ fn thinned(recordings: &[Recording]) -> Vec<Recording> {
     recordings.iter().map(|recording| recording.thinned(period.clamp(PERIODS.0, PERIODS.1))).collect()
 }
 
-/// The causes of what the nominal model leaves, beside those that are known; `None` where it cannot be simulated.
+/// The causes of what the nominal model leaves, beside those that are known; `None` where it cannot be simulated, or where
+/// nothing beside the known ones is worth looking for.
 fn search(bench: &mut Bench, known: Option<&Chosen>, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
     let first = bench.baseline()?;
     bench.refine_noise(&first.residuals);

@@ -33,7 +33,7 @@ const LEFT_BY_FORM: f64 = 0.01;
 /// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
 /// in the forms, which are never known exactly.
 const ALSO_BY_FORM: f64 = 3.0;
-/// Share of the error that a hypothesis must explain before its refinement, to become a rival of one that leaves nothing.
+/// Share of the error that a hypothesis must explain to be refined as a possible rival of the best.
 const MAY_RIVAL: f64 = 0.8;
 /// How many times the structural error of a sound model an error must be to be called unexplained.
 const UNEXPLAINED: f64 = 9.75;
@@ -152,7 +152,7 @@ impl Chosen {
         !self.model.hypothesis.parts.is_empty()
     }
 
-    /// Whether the named causes leave more than noise.
+    /// Whether causes are named, and leave more than a sound model may.
     pub fn leaves_something(&self, data: &Data) -> bool {
         self.names_causes() && is_unsound(&data.losses(&self.model.residuals, Scope::All), data)
     }
@@ -282,9 +282,9 @@ impl<'a, 'b> Search<'a, 'b> {
         sorted(starts.into_par_iter().filter_map(best).collect())
     }
 
-    /// The same, those that are carried on with their last effect, and the very best with all of its effects, refined and
-    /// fitted to the end: what a fit left undone would else be credited to the next effect. So are those that may rival the very
-    /// best; where that leaves nothing to look for, only those are, with all of theirs.
+    /// The same, refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
+    /// best with all of its effects, those that are carried on or may rival it with their last. Where the best leaves no more
+    /// than forms may, only its possible rivals are, with all of theirs.
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
@@ -361,8 +361,8 @@ impl<'a, 'b> Search<'a, 'b> {
         Some(self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &start)?))
     }
 
-    /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect: of what the
-    /// form of one cause may leave it is worth a second one, but what the forms of two may leave is not worth a third.
+    /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect. What the form
+    /// of one cause may leave is worth a second one; what the forms of two may leave is not worth a third.
     fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
         let most = levels.last().map_or(0, |level| effects_of(level));
         let leading = self.leading(levels).filter(|best| best.fitted.hypothesis.parts.len() == most);
@@ -633,7 +633,7 @@ fn carried_on(level: &[Judged]) -> Vec<usize> {
     chosen
 }
 
-/// Ranks of the hypotheses that may rival one that leaves nothing: of those that explain enough the best, and those that explain
+/// Ranks of the hypotheses that may rival the best: of those that explain enough the best, and those that explain
 /// the most, since in one signal a form that is not quite right spoils the odds.
 fn may_rival(level: &[Judged]) -> Vec<usize> {
     let mut ranks: Vec<usize> = (0..level.len()).filter(|rank| level[*rank].explained > MAY_RIVAL).collect();

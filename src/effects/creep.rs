@@ -5,9 +5,9 @@ crate::variables::variables! {
     ///
     /// # Model
     /// The membrane feels x − d₁ − d₂ + n (a₁ + a₂) x, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
-    /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing
-    /// drifts, and dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The nominal coefficients have the share n of it already, `nominal_share`: all of
-    /// it if they are those of a muscle at rest. The pressure pulls by d_F more, with
+    /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing drifts, and
+    /// dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The nominal coefficients have the share n of all drift from the rest length already,
+    /// `nominal_share`: all of it if they are those of a muscle that was held for long. The pressure pulls by d_F more, with
     /// τ₁ dd_F/dt + d_F = a_F (A p − A(0) p(0)), `pull_amplitude` a_F. While a drift goes back, its time is `return_ratio` τ.
     /// A standard linear solid is stiffer for fast changes: springs kᵢ in parallel with the membrane, `relaxing_stiffness_1` and
     /// `relaxing_stiffness_2`, pull back with kᵢ eᵢ, deᵢ/dt = dx/dt − eᵢ/τᵢ, with `return_ratio` τᵢ while eᵢ < 0.
@@ -38,7 +38,7 @@ crate::variables::variables! {
         relaxed_share: f64 = 1.0, ONE, (0.0..=1.0);
         /// Share of the remaining drift that lies before the start
         settled_share: f64 = 0.0, ONE, (0.0..=1.0);
-        /// Share of the drift that the nominal coefficients have already
+        /// Share of the drift from the rest length that the nominal coefficients have already
         nominal_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Drift of the pull of the pressure, per pull
         pull_amplitude: f64 = 0.0, ONE, (-0.5..=1.0);
@@ -63,7 +63,7 @@ impl Effect for Creep {
     const DESCRIPTION: Description = Description {
         name: "creep",
         meaning: "slow visco-elastic drift of the membrane at constant pressure",
-        equation: "x <- x - d1 - d2;  tau_i d(d_i)/dt + d_i = a_i (x - x_r);  A p <- A p + d_F;  F <- F - k_i e_i",
+        equation: "x <- x - d1 - d2 + n (a_1 + a_2) x;  tau_i d(d_i)/dt + d_i = a_i (x - x_r);  A p <- A p + d_F;  F <- F - k_i e_i",
         signature: "drift over seconds at constant measured pressure",
         experiment: "hold for a minute after a step, up and down",
         reference: "Kelvin-Voigt; Minh et al. 2010",
@@ -128,7 +128,7 @@ impl Effect for Creep {
             return contraction;
         }
         let known = self.nominal_share * (self.amplitude_1 + self.amplitude_2);
-        contraction - own[0] - own[1] + if known == 0.0 { 0.0 } else { known * at.contraction }
+        contraction - own[0] - own[1] + known * at.contraction
     }
 
     fn sentence(&self) -> String {

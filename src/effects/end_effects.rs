@@ -26,7 +26,7 @@ crate::variables::variables! {
         low_pressure_excess: f64 = 0.0, ONE, (-0.5..=1.0);
         /// Relative growth of both from 0.1 m to 0.2 m of contraction
         growth: f64 = 0.0, ONE, (-1.0..=1.0);
-        /// Share of the excess that the elastic force has, too
+        /// Share of the excess that the membrane feels, too
         elastic_share: f64 = 1.0, ONE, (0.0..=1.0);
     }
 }
@@ -49,7 +49,7 @@ impl Effect for EndEffects {
     const DESCRIPTION: Description = Description {
         name: "end_effects",
         meaning: "the ends are no cylinder: the contraction counts k times",
-        equation: "x <- x (1 + (c + a exp(-p/1 bar)) (1 + g (x/0.1 m - 1)))",
+        equation: "x <- k x, k = 1 + (c + a exp(-p/1 bar)) (1 + g (x/0.1 m - 1));  membrane: x <- x + m (k - 1) x",
         signature: "force residual grows with contraction and pressure",
         experiment: "compare two rest lengths",
         reference: "Tondu and Lopez 2000; Kothera et al. 2009",
@@ -76,8 +76,14 @@ impl Effect for EndEffects {
 
     fn sentence(&self) -> String {
         let at_two_bar = 1.0 + self.excess + self.low_pressure_excess * (-2e5 / FADE).exp();
+        let membrane = if self.elastic_share == 1.0 {
+            String::new()
+        } else {
+            format!(", for the membrane {:.2} times", 1.0 + self.elastic_share * (at_two_bar - 1.0))
+        };
         format!(
-            "The ends of the muscle contract less than its middle: at 2 bar the contraction counts {at_two_bar:.2} times."
+            "The ends of the muscle contract less than its middle: at 2 bar the contraction counts {at_two_bar:.2} \
+             times{membrane}."
         )
     }
 }

@@ -31,7 +31,7 @@ impl Effect for ForceGain {
     const DESCRIPTION: Description = Description {
         name: "force_gain",
         meaning: "the whole force is scaled: wrong bore, ageing",
-        equation: "F_static <- F_static (1 + g + b (F_static/400 N - 1))",
+        equation: "F_static <- F_static (1 + g + b (F_static/400 N - 1)), of the elastic force 1 + m g for 1 + g",
         signature: "force residual in proportion to the force, and the motion with it",
         experiment: "two known masses, static and dynamic",
         reference: "definition",
@@ -59,6 +59,13 @@ impl Effect for ForceGain {
 
     fn sentence(&self) -> String {
         let word = if self.relative_error < 0.0 { "weaker" } else { "stronger" };
-        format!("The muscle is {:.1} % {word} than nominal.", 100.0 * self.relative_error.abs())
+        let percent = 100.0 * self.relative_error.abs();
+        if self.elastic_share == 1.0 {
+            return format!("The muscle is {percent:.1} % {word} than nominal.");
+        }
+        let of_membrane = self.elastic_share * percent;
+        format!(
+            "The pull of the pressure is {percent:.1} % {word} than nominal, that of the membrane {of_membrane:.1} %."
+        )
     }
 }

@@ -170,7 +170,7 @@ pub trait Effect: Declared + Default {
     fn effective_pressure(&self, _at: &Point, pressure: f64) -> f64 {
         pressure
     }
-    /// Contraction in m that the membrane feels.
+    /// Contraction in m that braid and membrane feel, where the membrane's is not another one.
     fn effective_contraction(&self, _at: &Point, _own: &[f64], contraction: f64) -> f64 {
         contraction
     }
@@ -202,7 +202,7 @@ pub trait Effect: Declared + Default {
     fn mass(&self, mass: f64) -> f64 {
         mass
     }
-    /// Mass in kg that moves, where so much of it weighs.
+    /// Mass in kg that moves, given the one that weighs.
     fn inertia(&self, mass: f64) -> f64 {
         mass
     }
@@ -368,7 +368,10 @@ macro_rules! effects {
             chained! { "Command in V on which the valve acts."; command; $($field: $Effect;)* }
             chained! { "Gauge pressure in Pa that the valve goes for."; target_pressure; $($field: $Effect;)* }
             chained! { "Rate of the gauge pressure in Pa/s."; pressure_rate; $($field: $Effect;)* }
-            chained! { "Contraction in m that the membrane feels."; effective_contraction; $($field: $Effect;)* }
+            chained! {
+                "Contraction in m that braid and membrane feel, where the membrane's is not another one.";
+                effective_contraction; $($field: $Effect;)*
+            }
             chained! {
                 "Contraction in m that what resists elastically feels, where the braid feels the given one.";
                 elastic_contraction; $($field: $Effect;)*
@@ -411,7 +414,7 @@ macro_rules! effects {
                 mass
             }
 
-            /// Mass in kg that moves, where so much of it weighs.
+            /// Mass in kg that moves, given the one that weighs.
             #[inline]
             pub fn inertia(&self, mut mass: f64) -> f64 {
                 $(mass = self.$field.inertia(mass);)*

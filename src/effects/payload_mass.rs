@@ -6,7 +6,7 @@ crate::variables::variables! {
     /// # Model
     /// M ← M (1 + m) + ΔM: `additional_mass` ΔM, the same with every load (a hanger that was not weighed),
     /// `relative_error` m of what was entered (a wrong scale). `inertia` ΔI moves along without a weight: a pulley's moment of
-    /// inertia over its radius squared, or both masses of a counterweight whose weight ΔM takes away.
+    /// inertia over its radius squared, or twice a counterweight −ΔM, whose weight is taken away and whose mass moves along.
     ///
     /// # In the data
     /// The force residual is in proportion to g + d²x/dt², also at rest; the resonance shifts. With one load only it
@@ -28,7 +28,7 @@ impl Effect for PayloadMass {
     const DESCRIPTION: Description = Description {
         name: "payload_mass",
         meaning: "the load is not what was entered",
-        equation: "M <- M (1 + m) + dM, of which the weight is M g and the inertia M + dI",
+        equation: "M <- M (1 + m) + dM;  weight M g, inertia M + dI",
         signature: "force residual in proportion to g + acceleration, also at rest",
         experiment: "two known masses, static and dynamic",
         reference: "thesis eq. 5.4",
@@ -58,7 +58,8 @@ impl Effect for PayloadMass {
         let word = |change: f64| if change < 0.0 { "lighter" } else { "heavier" };
         let (mass, percent) = (self.additional_mass, 100.0 * self.relative_error);
         let if_any = |size: f64, text: String| if size == 0.0 { String::new() } else { text };
-        let inertia = if_any(self.inertia, format!("; {:+.2} kg more move than weigh", self.inertia));
+        let how = if self.inertia < 0.0 { "weigh and do not move" } else { "move along and do not weigh" };
+        let inertia = if_any(self.inertia, format!("; {:.2} kg {how}", self.inertia.abs()));
         if percent == 0.0 {
             return format!("The load is {:.2} kg {} than entered{inertia}.", mass.abs(), word(mass));
         }

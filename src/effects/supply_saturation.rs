@@ -9,9 +9,9 @@ crate::variables::variables! {
     /// A supply whose pressure is too low for the command.
     ///
     /// # Model
-    /// p_target ← min(p_target, p_s − s − d max(p_target − p, 0)), ds/dt = f + u max(p_target − p, 0) − s/τ: `gauge_pressure` p_s of the
-    /// supply at the start, its `fall` f over time, its `droop` d while it fills the muscle, what that takes from a small tank by
-    /// its `usage` u, and `recovery_time` τ of its compressor. With `rounding` r the minimum is r-soft:
+    /// p_target ← p_t = min(p_target, p_s − s − d max(p_target − p, 0)), ds/dt = f + u max(p_t − p, 0) − s/τ from s = 0 at the start:
+    /// `gauge_pressure` p_s of the supply at the start, its `fall` f over time, its `droop` d while it fills the muscle; `usage` u is
+    /// what filling takes from a small tank, `recovery_time` τ that of its compressor. With `rounding` r the minimum is r-soft:
     /// p_target − r ln(1 + exp((p_target − ceiling)/r)).
     ///
     /// # In the data
@@ -51,7 +51,7 @@ impl Effect for SupplySaturation {
     const DESCRIPTION: Description = Description {
         name: "supply_saturation",
         meaning: "the supply pressure is too low for the command",
-        equation: "p_target <- min(p_target, p_s - f t - d max(p_target - p, 0))",
+        equation: "p_target <- p_t = min(p_target, p_s - s - d max(p_target - p, 0));  ds/dt = f + u max(p_t - p, 0) - s/tau",
         signature: "pressure residual above a ceiling only",
         experiment: "record the supply pressure; raise it",
         reference: "definition",
@@ -95,6 +95,14 @@ impl Effect for SupplySaturation {
         } else {
             format!(" at first, and {:.3} bar less each minute", 60e-5 * self.fall)
         };
-        format!("The supply gives no more than {:.2} bar{falling}.", self.gauge_pressure * 1e-5)
+        let taken = if self.usage == 0.0 {
+            String::new()
+        } else {
+            format!("; it is a small tank, which loses {:.2} bar in a second of filling by 1 bar", self.usage)
+        };
+        let recovers = self.recovery_time < FOREVER && (self.usage != 0.0 || self.fall != 0.0);
+        let made_up =
+            if recovers { format!(", made up for within {:.1} s", self.recovery_time) } else { String::new() };
+        format!("The supply gives no more than {:.2} bar{falling}{taken}{made_up}.", self.gauge_pressure * 1e-5)
     }
 }

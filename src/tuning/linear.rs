@@ -79,7 +79,8 @@ pub struct LinearPlant {
 impl LinearPlant {
     /// The plant with its load at rest at a contraction in m; by central differences of the model's own equations.
     pub fn at(parameters: &Parameters, contraction: f64) -> Self {
-        let pressure = resting_pressure(parameters, contraction, parameters.load.mass * GRAVITY);
+        let weighing = parameters.effects.mass(parameters.load.mass);
+        let pressure = resting_pressure(parameters, contraction, weighing * GRAVITY);
         let rest = [pressure, contraction, 0.0];
         let command = pressure / parameters.valve.gain;
         let rates_at = |states: &[f64; 3], command: f64| {
@@ -107,7 +108,7 @@ impl LinearPlant {
         let step = 1e-4;
         let input = (rates_at(&rest, command + step)[0] - rates_at(&rest, command - step)[0]) / (2.0 * step);
         let dead_time = parameters.effects.command_delay();
-        let mass = parameters.effects.inertia(parameters.effects.mass(parameters.load.mass));
+        let mass = parameters.effects.inertia(weighing);
         Self { rates, input, dead_time, mass }
     }
 

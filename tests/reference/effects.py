@@ -318,7 +318,7 @@ class LiftingSeal(Plant):
 
 
 class SmallTank(Plant):
-    """A tank of 1.85 bar gives what the muscle takes in, a third of its volume, and is filled again within 2.5 s."""
+    """A tank of 1.85 bar, four times as large as the muscle, is filled again within 2.5 s."""
 
     own_scales = (1e5,)
 
