@@ -93,12 +93,13 @@ impl Effect for SupplySaturation {
         let falling = if self.fall == 0.0 {
             String::new()
         } else {
-            format!(" at first, and {:.3} bar less each minute", 60e-5 * self.fall)
+            let word = if self.fall < 0.0 { "more" } else { "less" };
+            format!(" at first, and {:.3} bar {word} each minute", 60e-5 * self.fall.abs())
         };
         let taken = if self.usage == 0.0 {
             String::new()
         } else {
-            format!("; it is a small tank, which loses {:.2} bar in a second of filling by 1 bar", self.usage)
+            format!("; it is a small tank, which loses {:.2} bar/s while the muscle lacks 1 bar", self.usage)
         };
         let recovers = self.recovery_time < FOREVER && (self.usage != 0.0 || self.fall != 0.0);
         let made_up =
