@@ -174,11 +174,10 @@ fn nominal_pressure_rate(parameters: &Parameters, command: f64, gauge_pressure: 
     parameters.valve.bandwidth * (parameters.valve.target_pressure(command) - gauge_pressure)
 }
 
-/// Masses in kg that weigh and that move.
+/// Masses in kg of the load that weigh and that move, in this order.
 #[inline]
-fn masses(parameters: &Parameters) -> (f64, f64) {
-    let weighing = parameters.effects.mass(parameters.load.mass);
-    (weighing, parameters.effects.inertia(weighing))
+pub fn masses(parameters: &Parameters) -> (f64, f64) {
+    parameters.effects.masses(parameters.load.mass)
 }
 
 /// Point of a muscle at rest, its valve asking for the pressure that is there.

@@ -7,7 +7,7 @@ use crate::model::{Simulator, System};
 use crate::parameters::Parameters;
 use crate::plant::{
     ActuatorInputs, ActuatorOutputs, MeasuredInputs, MuscleAlone, MuscleInputs, MuscleOutputs, PneumaticActuator,
-    PneumaticMuscle, resting_pressure, steady_pressure,
+    PneumaticMuscle, masses, resting_pressure, steady_pressure,
 };
 use crate::reference::ReferenceTrajectory;
 use crate::variables::Signals;
@@ -332,8 +332,8 @@ impl ClosedLoop {
 /// The parameters with the initial pressure at which the load hangs still where the reference starts.
 pub fn at_rest_on_reference(parameters: &Parameters) -> Parameters {
     let mut parameters = *parameters;
-    let weight = parameters.effects.mass(parameters.load.mass) * GRAVITY;
-    parameters.initial.gauge_pressure = resting_pressure(&parameters, parameters.reference.start, weight);
+    let (weighing, _) = masses(&parameters);
+    parameters.initial.gauge_pressure = resting_pressure(&parameters, parameters.reference.start, weighing * GRAVITY);
     parameters
 }
 

@@ -153,15 +153,18 @@ impl Hypothesis {
         self.parts.iter().any(|part| part.effect.name == effect)
     }
 
+    /// The free parameters of all effects.
+    fn freed(&self) -> impl Iterator<Item = &'static Freed> {
+        self.parts.iter().flat_map(|part| part.freed())
+    }
+
     fn variables(&self) -> Vec<&'static Variable> {
-        let freed = self.parts.iter().flat_map(|part| part.freed());
-        freed.map(|(name, _)| declared(&Parameters::default(), name).0).collect()
+        self.freed().map(|(name, _)| declared(&Parameters::default(), name).0).collect()
     }
 
     /// A model with the effects as they are at work in another one.
     pub fn at_work_in(&self, model: &Parameters, other: &Parameters) -> Parameters {
-        let freed = self.parts.iter().flat_map(|part| part.freed());
-        let (variables, values): (Vec<_>, Vec<_>) = freed.map(|(name, _)| declared(other, name)).unzip();
+        let (variables, values): (Vec<_>, Vec<_>) = self.freed().map(|(name, _)| declared(other, name)).unzip();
         with_values(model, &variables, &values)
     }
 
@@ -176,7 +179,7 @@ impl Hypothesis {
 
     /// How many parameters the effects have.
     pub fn size(&self) -> usize {
-        self.parts.iter().map(|part| part.freed().count()).sum()
+        self.freed().count()
     }
 }
 

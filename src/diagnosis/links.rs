@@ -216,9 +216,9 @@ impl<'a> Chain<'a> {
         let (force, mass) = (self.recording.get(Signal::Force)?, self.recording.load_mass()?);
         let contraction = self.true_contraction()?;
         let effects = &self.parameters.effects;
+        let (weighing, moving) = effects.masses(mass);
         let needed = parabolas(&self.recording.time, &contraction).zip(&contraction).map(|(motion, contraction)| {
-            let weighing = effects.mass(mass);
-            let force = weighing * GRAVITY + effects.inertia(weighing) * motion.curvature;
+            let force = weighing * GRAVITY + moving * motion.curvature;
             (contraction, force)
         });
         let time = self.since_start();

@@ -407,18 +407,14 @@ macro_rules! effects {
                 0.0 $(+ self.$field.stretch(force))*
             }
 
-            /// Mass in kg that weighs.
+            /// Masses in kg of a load that weigh and that move, in this order, where one was entered.
             #[inline]
-            pub fn mass(&self, mut mass: f64) -> f64 {
-                $(mass = self.$field.mass(mass);)*
-                mass
-            }
-
-            /// Mass in kg that moves, given the one that weighs.
-            #[inline]
-            pub fn inertia(&self, mut mass: f64) -> f64 {
-                $(mass = self.$field.inertia(mass);)*
-                mass
+            pub fn masses(&self, entered: f64) -> (f64, f64) {
+                let mut weighing = entered;
+                $(weighing = self.$field.mass(weighing);)*
+                let mut moving = weighing;
+                $(moving = self.$field.inertia(moving);)*
+                (weighing, moving)
             }
 
             /// What the sensors show.

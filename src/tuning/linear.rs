@@ -4,7 +4,7 @@ use crate::GRAVITY;
 use crate::controller::Controller;
 use crate::model::{State, System};
 use crate::parameters::Parameters;
-use crate::plant::{MuscleInputs, PneumaticMuscle, resting_pressure};
+use crate::plant::{MuscleInputs, PneumaticMuscle, masses, resting_pressure};
 use nalgebra::{Complex, DMatrix};
 
 /// Polynomial in s: coefficients of 1, s, s², …
@@ -79,7 +79,7 @@ pub struct LinearPlant {
 impl LinearPlant {
     /// The plant with its load at rest at a contraction in m; by central differences of the model's own equations.
     pub fn at(parameters: &Parameters, contraction: f64) -> Self {
-        let weighing = parameters.effects.mass(parameters.load.mass);
+        let (weighing, mass) = masses(parameters);
         let pressure = resting_pressure(parameters, contraction, weighing * GRAVITY);
         let rest = [pressure, contraction, 0.0];
         let command = pressure / parameters.valve.gain;
@@ -108,7 +108,6 @@ impl LinearPlant {
         let step = 1e-4;
         let input = (rates_at(&rest, command + step)[0] - rates_at(&rest, command - step)[0]) / (2.0 * step);
         let dead_time = parameters.effects.command_delay();
-        let mass = parameters.effects.inertia(weighing);
         Self { rates, input, dead_time, mass }
     }
 
