@@ -17,8 +17,9 @@ pub struct Course {
 }
 
 impl Course {
-    /// 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j times how far a ramp over d around t_j has come.
+    /// 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j times how far a ramp over d around t_j has come; before the start as there.
     pub fn at(&self, time: f64) -> f64 {
+        let time = time.max(0.0);
         let (settling, constant) = self.settling;
         let (swing, period, phase) = self.swing;
         let (shift, middle, lasts) = self.shift;
@@ -64,7 +65,7 @@ impl Course {
             );
         }
         if shows(swing) {
-            let _ = write!(told, ", swinging by {} in {period:.0} s", percent(swing));
+            let _ = write!(told, ", swinging by ±{} with a period of {period:.0} s", percent(swing));
         }
         if shows(shift) {
             let _ = write!(told, ", {} {} from {middle:.1} s on", percent(shift), word(shift));
@@ -91,11 +92,11 @@ macro_rules! zero {
                 settling_share: f64 = 0.0, ONE, (-1.0..=2.0);
                 /// Time constant of the settling
                 settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
-                /// Share by which the offset swings, as with an air conditioning
+                /// Share by which the offset swings, as an air conditioner makes it
                 swing_share: f64 = 0.0, ONE, (0.0..=1.0);
                 /// Period of the swing
                 swing_period: f64 = 30.0, SECOND, ($crate::zero::FASTEST..=1000.0);
-                /// Phase of the swing at the start
+                /// Phase of the swing at the start, in rad
                 swing_phase: f64 = 0.0, ONE, (-10.0..=10.0);
                 /// Share by which the offset shifts once, as after a shock
                 shift_share: f64 = 0.0, ONE, (-2.0..=2.0);

@@ -355,7 +355,7 @@ fn every_form_of_every_effect_acts_on_the_plant() {
         along_lines(model.as_mut(), 1, 50)
     };
     for effect in Effects::DESCRIPTIONS {
-        for form in effect.forms {
+        for form in effect.all_forms() {
             let mut on = still;
             form.iter().for_each(|(name, starts)| on.set(name, starts[0]).unwrap());
             assert_ne!(course(&still), course(&on), "{form:?}");

@@ -185,7 +185,7 @@ impl Hypothesis {
             let ((variable, value), neutral) = (declared(parameters, size), declared(&Parameters::default(), size).1);
             value != neutral && (value <= variable.min || value >= variable.max)
         };
-        !parameters.effects.are_plausible() || self.parts.iter().any(is_too_large)
+        self.parts.iter().any(|part| !parameters.effects.is_plausible(part.effect.name) || is_too_large(part))
     }
 
     /// How many parameters the effects have.

@@ -26,8 +26,8 @@ const LEAST_FURTHER: f64 = 0.8;
 const LEAST_OF_FORM: f64 = 0.9;
 /// The same before the hypothesis is refined: fits of two effects that came to be named began at 0.87 and more.
 const MAY_GO_FURTHER: f64 = 0.5;
-/// Variance, relative to that of the noise, that a further effect must take off what may be the first one's form: what is less than
-/// the noise itself says nothing of a cause.
+/// Variance, relative to that of the noise, that a further effect must take off where what is left may be the form of the first:
+/// what is less than the noise itself says nothing of a cause.
 const LEAST_BESIDE_FORM: f64 = 1.0;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;

@@ -14,7 +14,7 @@ zero! {
     ///
     /// # Validity
     /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
-    /// once by a shock.
+    /// once by a shock; in every recording alike, from its start.
     ///
     /// # Reference
     /// Definition of an offset.
@@ -28,7 +28,7 @@ impl Effect for ContractionSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "contraction_sensor_offset",
         meaning: "the zero of the position sensor is not at the rest length",
-        equation: "x_measured <- x_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j ramp((t - t_j)/d)",
+        equation: "x_measured <- x_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the contraction, also at rest",
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",

@@ -100,6 +100,7 @@ impl Effect for Creep {
             == [0.0; 5]
     }
 
+    // The second element may be a small part of the whole, and fast.
     fn is_plausible(&self) -> bool {
         self.time_1 > SLOW && self.amplitude_1 > AHEAD && self.amplitude_2 > AHEAD
     }

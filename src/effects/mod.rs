@@ -140,7 +140,7 @@ pub trait Effect: Declared + Default {
     fn rests(&self) -> bool {
         self.is_neutral()
     }
-    /// Whether its values are such as the cause can have; the bounds of its parameters are wider, for what fits may try.
+    /// Whether its values are such as the cause can have: fits may try more, and what ends at a bound was not found.
     fn is_plausible(&self) -> bool {
         true
     }
@@ -285,9 +285,9 @@ macro_rules! effects {
                 true $(&& self.$field.is_neutral())*
             }
 
-            /// Whether the values of all effects are such as their causes can have.
-            pub fn are_plausible(&self) -> bool {
-                true $(&& self.$field.is_plausible())*
+            /// Whether the values of the effect with this name are such as its cause can have.
+            pub fn is_plausible(&self, name: &str) -> bool {
+                true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible()))*
             }
 
             /// Whether the states of all effects rest.

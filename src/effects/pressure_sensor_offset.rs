@@ -15,7 +15,7 @@ zero! {
     ///
     /// # Validity
     /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
-    /// once by a shock.
+    /// once by a shock; in every recording alike, from its start.
     ///
     /// # Reference
     /// Definition of an offset.
@@ -29,7 +29,7 @@ impl Effect for PressureSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "pressure_sensor_offset",
         meaning: "the zero of the pressure sensor is not at ambient pressure",
-        equation: "p_measured <- p_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j ramp((t - t_j)/d)",
+        equation: "p_measured <- p_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the pressure, also at rest",
         experiment: "read the sensor with the muscle open to the air",
         reference: "definition",

@@ -10,7 +10,8 @@ crate::variables::variables! {
     /// Slow change while the muscle warms up.
     ///
     /// # Model
-    /// τ dw/dt = 1 − k + k |P|/(10 W) − w from w = 0 at the start, P = F_p dx/dt the power of the pressure's pull F_p; the area counts
+    /// τ dw/dt = 1 − k + k |P|/(10 W) − w from w = 0 at the start, P = F_p dx/dt the power of the pressure's pull F_p
+    /// without effects; the area counts
     /// 1 + a w times, the elastic force 1 + e w times: `time_constant` τ, `work_share` k, `area_change` a, `elastic_change` e.
     ///
     /// # In the data
@@ -18,11 +19,10 @@ crate::variables::variables! {
     /// Creep comes back after every step.
     ///
     /// # Validity
-    /// The recording starts cold. Either its surroundings warm the muscle, or its own work does, which is lost to the membrane in
-    /// proportion; no muscle warms within less than 3 s.
+    /// The recording starts cold. Its surroundings warm the muscle, or its own work, of which a fixed share becomes heat; no muscle warms within less than 3 s.
     ///
     /// # Reference
-    /// Newton's law of heating; definition.
+    /// Newton's law of cooling; definition.
     pub struct TemperatureDrift in "temperature_drift." as Tunable {
         /// Relative change of the area when warm
         area_change: f64 = 0.0, ONE, (-0.5..=0.5);
@@ -80,9 +80,12 @@ impl Effect for TemperatureDrift {
     }
 
     fn sentence(&self) -> String {
-        let by_work = if self.work_share == 0.0 { "" } else { " by its own work, stated for 10 W" };
+        let by_work = match 100.0 * self.work_share {
+            0.0 => String::new(),
+            share => format!(", {share:.0} % of it by its own work, told for 10 W"),
+        };
         format!(
-            "The muscle changes as it warms up{by_work}, within {:.0} s: its area by {:+.1} %, its elastic force by {:+.1} %.",
+            "The muscle changes as it warms up within {:.0} s{by_work}: its area by {:+.1} %, its elastic force by {:+.1} %.",
             self.time_constant,
             100.0 * self.area_change,
             100.0 * self.elastic_change

@@ -14,7 +14,7 @@ zero! {
     /// force stays.
     ///
     /// # Validity
-    /// As with the zeros of sensors.
+    /// Constant, settling, swinging or shifted once, as the zeros of sensors; in every recording alike, from its start.
     ///
     /// # Reference
     /// Zero errors in data sheets of proportional pressure regulators.
@@ -28,7 +28,7 @@ impl Effect for ValveOffset {
     const DESCRIPTION: Description = Description {
         name: "valve_offset",
         meaning: "the zero of the valve is off",
-        equation: "u <- u + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j ramp((t - t_j)/d)",
+        equation: "u <- u + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the pressure, and of the force with it",
         experiment: "stairs of the command with the pressure recorded by a second sensor",
         reference: "definition",
@@ -52,7 +52,7 @@ impl Effect for ValveOffset {
         self.is_neutral() || self.course().is_constant()
     }
 
-    // The state is the time since the start.
+    // The state is the time since the start, or since the offset ceased to be constant.
     fn rates(&self, _at: &Point, _own: &[f64], rates: &mut [f64]) {
         rates[0] = 1.0;
     }
