@@ -22,7 +22,6 @@ pub mod parameters;
 pub mod plant;
 pub mod reference;
 pub mod valve;
-mod zero;
 
 #[cfg(feature = "tool")]
 pub mod closed_loop;
