@@ -10,7 +10,7 @@
 //! E. Hairer, S. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, II.4.
 
 /// Error of one step, relative to the scale of each state, that is accepted where nothing else is asked for.
-pub const TOLERANCE: f64 = 1e-8;
+pub const TOLERANCE: f64 = 5e-9;
 const LARGEST_STEP: f64 = 0.05;
 const SMALLEST_STEP: f64 = 1e-9;
 /// A call that needs more steps than this would keep its caller waiting for seconds: the parameters make no sense.

@@ -22,6 +22,7 @@ pub mod parameters;
 pub mod plant;
 pub mod reference;
 pub mod valve;
+mod zero;
 
 #[cfg(feature = "tool")]
 pub mod closed_loop;

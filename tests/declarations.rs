@@ -49,7 +49,7 @@ fn names_are_unique_and_defaults_are_allowed() {
         variable.check(value).unwrap();
     });
     for effect in Effects::DESCRIPTIONS {
-        for (name, starts) in effect.forms.iter().copied().flatten().chain(effect.refinements) {
+        for (name, starts) in effect.all_forms().flatten().chain(effect.refinements) {
             assert!(name.starts_with(effect.name) && names.contains(name), "{name}");
             starts.iter().for_each(|start| Parameters::default().set(name, *start).unwrap());
         }
@@ -63,7 +63,7 @@ fn names_are_unique_and_defaults_are_allowed() {
 fn everything_at_work() -> Parameters {
     let mut parameters = Parameters::default();
     for effect in Effects::DESCRIPTIONS {
-        for (name, starts) in effect.forms.iter().copied().flatten().chain(effect.refinements) {
+        for (name, starts) in effect.all_forms().flatten().chain(effect.refinements) {
             parameters.set(name, starts[0]).unwrap();
         }
     }
@@ -301,6 +301,11 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
         ("valve_lag.growth_with_contraction", 0.5),
         ("valve_resonance.lead", 0.5),
         ("temperature_drift.time_constant", 5.0),
+        ("temperature_drift.work_share", 0.5),
+        ("valve_offset.settling_share", 0.5),
+        ("valve_offset.swing_share", 0.5),
+        ("contraction_sensor_offset.swing_share", 0.5),
+        ("pressure_sensor_offset.shift_share", 0.5),
     ] {
         moved.set(parameter, value).unwrap();
     }
@@ -350,7 +355,7 @@ fn every_form_of_every_effect_acts_on_the_plant() {
         along_lines(model.as_mut(), 1, 50)
     };
     for effect in Effects::DESCRIPTIONS {
-        for form in effect.forms {
+        for form in effect.all_forms() {
             let mut on = still;
             form.iter().for_each(|(name, starts)| on.set(name, starts[0]).unwrap());
             assert_ne!(course(&still), course(&on), "{form:?}");

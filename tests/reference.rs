@@ -136,6 +136,33 @@ fn effects_agree_with_scipy() {
                 ("supply_saturation.recovery_time", 2.5),
             ],
         ),
+        (
+            "swinging_zero",
+            &[
+                ("valve_offset.offset", 0.12),
+                ("valve_offset.swing_share", 0.3),
+                ("valve_offset.swing_period", 8.5),
+                ("valve_offset.swing_phase", 0.7),
+            ],
+        ),
+        (
+            "shifting_zero",
+            &[
+                ("contraction_sensor_offset.offset", 4e-3),
+                ("contraction_sensor_offset.shift_share", -0.6),
+                ("contraction_sensor_offset.shift_time", 2.2),
+                ("contraction_sensor_offset.shift_span", 0.6),
+            ],
+        ),
+        (
+            "warm_by_work",
+            &[
+                ("temperature_drift.area_change", 0.02),
+                ("temperature_drift.elastic_change", -0.03),
+                ("temperature_drift.time_constant", 4.0),
+                ("temperature_drift.work_share", 1.0),
+            ],
+        ),
         ("wrong_bore", &[("force_gain.relative_error", 0.08), ("force_gain.elastic_share", 0.5)]),
         (
             "stiff_ends",

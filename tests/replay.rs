@@ -16,7 +16,7 @@ const AT_REST: usize = 20;
 /// An effect in one of its forms with all its refinements.
 fn with_effect(effect: &Description, form: usize) -> Parameters {
     let mut parameters = Parameters::default();
-    for (name, starts) in effect.forms[form].iter().chain(effect.refinements) {
+    for (name, starts) in effect.all_forms().nth(form).unwrap().iter().chain(effect.refinements) {
         parameters.set(name, starts[0]).unwrap();
     }
     parameters
@@ -43,7 +43,7 @@ fn difference(parameters: &Parameters, recording: &Recording, signal: Signal) ->
 fn cases() -> impl Iterator<Item = (&'static Description, Parameters)> {
     Effects::DESCRIPTIONS
         .iter()
-        .flat_map(|effect| (0..effect.forms.len()).map(move |form| (effect, with_effect(effect, form))))
+        .flat_map(|effect| (0..effect.all_forms().count()).map(move |form| (effect, with_effect(effect, form))))
 }
 
 #[test]

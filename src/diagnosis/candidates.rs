@@ -82,13 +82,23 @@ pub struct Part {
 }
 
 impl Part {
+    /// The parameters of its form, its size first.
+    fn in_form(self) -> &'static [Freed] {
+        self.effect.all_forms().nth(self.form).unwrap_or_default()
+    }
+
+    /// The parameter of its form that stands for its size.
+    fn size(self) -> &'static Freed {
+        &self.in_form()[0]
+    }
+
     /// The free parameters; a refinement that the form has already is not counted twice.
     pub fn freed(self) -> impl Iterator<Item = &'static Freed> {
-        self.effect.forms[self.form].iter().chain(self.refinements())
+        self.in_form().iter().chain(self.refinements())
     }
 
     fn refinements(self) -> impl Iterator<Item = &'static Freed> {
-        let form = self.effect.forms[self.form];
+        let form = self.in_form();
         let refinements = match self.refined {
             Refined::Not => &[],
             Refined::By(which) => &self.effect.refinements[which..=which],
@@ -168,13 +178,14 @@ impl Hypothesis {
         with_values(model, &variables, &values)
     }
 
-    /// Whether an effect would have to be larger than it can be: the fit ended at a bound of its size.
+    /// Whether an effect would have to be other than it can be, or larger: the fit ended at a bound of its size.
     pub fn is_impossible(&self, parameters: &Parameters) -> bool {
-        self.parts.iter().any(|part| {
-            let (size, _) = part.effect.forms[part.form][0];
+        let is_too_large = |part: &Part| {
+            let (size, _) = *part.size();
             let ((variable, value), neutral) = (declared(parameters, size), declared(&Parameters::default(), size).1);
             value != neutral && (value <= variable.min || value >= variable.max)
-        })
+        };
+        self.parts.iter().any(|part| !parameters.effects.is_plausible(part.effect.name) || is_too_large(part))
     }
 
     /// How many parameters the effects have.
@@ -354,9 +365,9 @@ impl<'a> Bench<'a> {
 
     /// A model at least as good, with sizes nearby of those effects whose error has many minima.
     pub fn scanned(&self, fitted: &Fitted) -> Parameters {
-        let sizes = fitted.hypothesis.parts.iter().map(|part| part.effect.forms[part.form][0]);
+        let sizes = fitted.hypothesis.parts.iter().map(|part| part.size());
         sizes
-            .filter(many_minima)
+            .filter(|size| many_minima(size))
             .flat_map(|(size, _)| SCANS.map(|share| (size, share)))
             .fold(fitted.parameters, |model, (size, share)| {
                 self.best_nearby(&model, size, share).map_or(model, |(_, better)| better)
@@ -364,11 +375,15 @@ impl<'a> Bench<'a> {
     }
 
     /// Where a fit starts that frees more of an effect than the `known` parameters of a model: at the first start of each, or,
-    /// where the error has many minima over the size, at the best of all with its size.
+    /// where the error has many minima over the size, at the best of all with its size. `None` where they change nothing: some
+    /// act only together with others.
     pub fn refined_start(&self, model: &Parameters, part: Part, known: &[&str]) -> Option<Parameters> {
         let new: Vec<_> = part.freed().filter(|(name, _)| !known.contains(name)).collect();
         let at = |choice: usize| at_start(model, new.iter().copied(), choice);
-        let size = &part.effect.forms[part.form][0];
+        if !new.is_empty() && self.data.residuals(&at(0)) == self.data.residuals(model) {
+            return None;
+        }
+        let size = part.size();
         if !many_minima(size) {
             return Some(at(0));
         }
@@ -436,7 +451,8 @@ impl<'a> Bench<'a> {
         Fitted { hypothesis: hypothesis.clone(), parameters, residuals, losses }
     }
 
-    /// Where fits of a hypothesis with one effect more start, the most promising first: every start of every form.
+    /// Where fits of a hypothesis with one effect more start, the most promising first: every start of every
+    /// common form.
     ///
     /// How promising is judged from one simulation: how much of the weighted squares of the residuals goes away when the
     /// change that the effect makes is scaled and the corrections and the parameters so far adapt, to first order.

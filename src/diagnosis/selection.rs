@@ -26,6 +26,9 @@ const LEAST_FURTHER: f64 = 0.8;
 const LEAST_OF_FORM: f64 = 0.9;
 /// The same before the hypothesis is refined: fits of two effects that came to be named began at 0.87 and more.
 const MAY_GO_FURTHER: f64 = 0.5;
+/// Variance, relative to that of the noise, that a further effect must take off where what is left may be the form of the first:
+/// what is less than the noise itself says nothing of a cause.
+const LEAST_BESIDE_FORM: f64 = 1.0;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
 /// Share of a signal's error that a named effect may leave because its form differs from the true one: a tenth of its rms.
@@ -284,7 +287,7 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The same, refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
     /// best with all of its effects, those that are carried on or may rival it with their last. Where the best leaves no more
-    /// than forms may, only its possible rivals are, with all of theirs.
+    /// than forms may, only its possible rivals are, with all of theirs; other forms are worth the time to single effects.
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
@@ -293,9 +296,10 @@ impl<'a, 'b> Search<'a, 'b> {
         let is_close = |(rank, _): &(usize, Judged)| rivals.contains(rank) || !may_be_form && ranks.contains(rank);
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
-        let refined = close.into_par_iter().map(|(_, judged)| {
-            let last = judged.fitted.hypothesis.parts.len() - 1;
-            if may_be_form { self.in_best_form(judged) } else { self.finished(self.part_refined(judged, last)) }
+        let refined = close.into_par_iter().map(|(_, judged)| match judged.fitted.hypothesis.parts.len() {
+            1 if may_be_form => self.in_best_form(judged),
+            _ if may_be_form => self.finished(self.refined(judged)),
+            parts => self.finished(self.part_refined(judged, parts - 1)),
         });
         sorted(refined.chain([best]).chain(rest).collect())
     }
@@ -320,7 +324,8 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The hypothesis in the best other form of its last effect: of the starts only the most promising were fitted.
     fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
         let last = judged.fitted.hypothesis.parts.last()?;
-        let others = (0..last.effect.forms.len()).filter(|form| *form != last.form).collect::<Vec<_>>().into_par_iter();
+        let others =
+            (0..last.effect.all_forms().count()).filter(|form| *form != last.form).collect::<Vec<_>>().into_par_iter();
         let fits = others.filter_map(|form| {
             let part = Part { form, refined: Refined::Not, ..*last };
             let start = self.bench.best_start(&judged.fitted.parameters, *last, part)?;
@@ -459,26 +464,29 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Whether a hypothesis with more effects is worth them: it pays, and explains a good part of what is left without.
     fn is_worth(&self, fewer: &Judged, more: &Judged) -> bool {
         let is_form_alone = self.may_be_form(&fewer.fitted.losses);
-        let least = if is_form_alone { LEAST_OF_FORM } else { LEAST_FURTHER };
+        let (share, variance) =
+            if is_form_alone { (LEAST_OF_FORM, LEAST_BESIDE_FORM) } else { (LEAST_FURTHER, NEGLIGIBLE) };
         evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE
-            && self.further(fewer, more) > least
-            && self.shows(&fewer.fitted.losses, &more.fitted.losses)
+            && self.further(fewer, more) > share
+            && self.takes_off(&fewer.fitted.losses, &more.fitted.losses, variance)
     }
 
     /// Whether what an effect takes off the error of some signal is more than the structural error of a sound model:
     /// less may be that.
     fn shows(&self, without: &[Loss], with: &[Loss]) -> bool {
-        let (before, after) = (beyond_noise(without), beyond_noise(with));
-        before.into_iter().any(|(signal, beyond)| beyond - after[&signal] > self.least_shown(signal))
+        self.takes_off(without, with, NEGLIGIBLE)
     }
 
-    fn least_shown(&self, signal: Signal) -> f64 {
-        self.bench.data.structure(signal).max(NEGLIGIBLE)
+    /// The same, and more than some variance, relative to that of the noise.
+    fn takes_off(&self, without: &[Loss], with: &[Loss], least: f64) -> bool {
+        let (before, after) = (beyond_noise(without), beyond_noise(with));
+        let least = |signal| self.bench.data.structure(signal).max(least);
+        before.into_iter().any(|(signal, beyond)| beyond - after[&signal] > least(signal))
     }
 
     /// Whether an effect could show at all.
     fn may_show(&self) -> bool {
-        !leaves_at_most(&self.baseline.losses, |signal| self.least_shown(signal))
+        !leaves_at_most(&self.baseline.losses, |signal| self.bench.data.structure(signal).max(NEGLIGIBLE))
     }
 
     /// Drops effects that a hypothesis of several can spare, the most superfluous first.

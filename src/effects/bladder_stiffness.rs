@@ -45,6 +45,7 @@ impl Effect for BladderStiffness {
                 ("bladder_stiffness.added_growth", &[0.3]),
             ],
         ],
+        further_forms: &[],
         refinements: &[("bladder_stiffness.change_with_contraction", &[0.1])],
     };
 

@@ -38,6 +38,7 @@ impl Effect for ContractionSensorDelay {
             &[("contraction_sensor_delay.delay", &[0.02, 0.06])],
             &[("contraction_sensor_delay.averaging", &[0.04, 0.12])],
         ],
+        further_forms: &[],
         refinements: &[("contraction_sensor_delay.averaging", &[0.02])],
     };
 

@@ -37,6 +37,7 @@ impl Effect for ContractionSensorGain {
             // A gain alone may be what the coefficients of the muscle stand for.
             &[("contraction_sensor_gain.bend", &[0.02]), ("contraction_sensor_gain.relative_error", &[0.0])],
         ],
+        further_forms: &[],
         refinements: &[("contraction_sensor_gain.bend", &[0.005])],
     };
 

@@ -1,33 +1,26 @@
-use super::{Description, Effect, Holds, Readings, settling};
+use super::{Description, Effect, Holds, Readings};
+use crate::zero::zero;
 
-crate::variables::variables! {
+zero! {
     /// A position sensor whose zero is not at the rest length.
     ///
     /// # Model
-    /// x_measured ← x_measured + o (1 + s exp(−t/τ)): `offset` o, `settling_share` s, `settling_time` τ, t since the start.
+    /// x_measured ← x_measured + o c(t), c = 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling_share` s,
+    /// `settling_time` τ, `swing_share` a, `swing_period` T, `swing_phase` φ, `shift_share` j; r goes from 0 to 1 within
+    /// `shift_span` around `shift_time`.
     ///
     /// # In the data
     /// A constant residual of the contraction, also at rest. Without it in the force, it is not a change of the muscle.
     ///
     /// # Validity
-    /// Constant, or settling while the sensor warms up from the start of the recording.
+    /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
+    /// once by a shock; in every recording alike, from its start.
     ///
     /// # Reference
     /// Definition of an offset.
-    pub struct ContractionSensorOffset in "contraction_sensor_offset." as Tunable {
+    pub struct ContractionSensorOffset in "contraction_sensor_offset." from 5e-3 {
         /// What the position sensor shows at rest length
-        offset: f64 = 0.0, METRE, (-0.2..=0.2);
-        /// Excess of the offset at the start, relative to the offset that settles
-        settling_share: f64 = 0.0, ONE, (-1.0..=2.0);
-        /// Time constant of the settling
-        settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
-    }
-}
-
-impl ContractionSensorOffset {
-    /// What the sensor adds at a time in s since the start.
-    fn zero(&self, time: f64) -> f64 {
-        settling(self.offset, self.settling_share, self.settling_time, time)
+        offset: METRE, (-0.2..=0.2);
     }
 }
 
@@ -35,29 +28,23 @@ impl Effect for ContractionSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "contraction_sensor_offset",
         meaning: "the zero of the position sensor is not at the rest length",
-        equation: "x_measured <- x_measured + o (1 + s exp(-t/tau))",
+        equation: "x_measured <- x_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the contraction, also at rest",
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[
-            &[("contraction_sensor_offset.offset", &[5e-3, -5e-3])],
-            // Corrections of the muscle take a constant offset over, and leave how it settles.
-            &[
-                ("contraction_sensor_offset.offset", &[5e-3, -5e-3, 5e-3, -5e-3]),
-                ("contraction_sensor_offset.settling_share", &[0.5]),
-                ("contraction_sensor_offset.settling_time", &[4.0, 4.0, 15.0, 15.0]),
-            ],
-        ],
-        refinements: &[
-            ("contraction_sensor_offset.settling_share", &[0.3]),
-            ("contraction_sensor_offset.settling_time", &[5.0]),
-        ],
+        forms: Self::FORMS,
+        further_forms: Self::FURTHER_FORMS,
+        refinements: Self::REFINEMENTS,
     };
 
     fn is_neutral(&self) -> bool {
         self.offset == 0.0
+    }
+
+    fn is_plausible(&self) -> bool {
+        self.course().is_plausible()
     }
 
     fn readings(&self, readings: Readings) -> Readings {
@@ -69,6 +56,6 @@ impl Effect for ContractionSensorOffset {
     }
 
     fn sentence(&self) -> String {
-        format!("The position sensor shows {:+.2} mm at the rest length.", self.offset * 1e3)
+        format!("The position sensor shows {:+.2} mm at the rest length{}.", self.offset * 1e3, self.course().told())
     }
 }

@@ -27,11 +27,11 @@ crate::variables::variables! {
     /// pace than it gives way: I. Ward, J. Sweeney (2012), Mechanical Properties of Solid Polymers, ch. 11.
     pub struct Creep in "creep." as Tunable {
         /// Drift per contraction, first element
-        amplitude_1: f64 = 0.0, ONE, (-0.5..=1.0);
+        amplitude_1: f64 = 0.0, ONE, (AHEAD..=1.0);
         /// Time constant, first element
         time_1: f64 = 3.0, SECOND, (0.05..=300.0);
         /// Drift per contraction, second element
-        amplitude_2: f64 = 0.0, ONE, (-0.5..=1.0);
+        amplitude_2: f64 = 0.0, ONE, (AHEAD..=1.0);
         /// Time constant, second element
         time_2: f64 = 20.0, SECOND, (0.05..=300.0);
         /// Share of the contraction at the start that no drift belongs to
@@ -41,7 +41,7 @@ crate::variables::variables! {
         /// Share of the drift from the rest length that the nominal coefficients have already
         nominal_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Drift of the pull of the pressure, per pull
-        pull_amplitude: f64 = 0.0, ONE, (-0.5..=1.0);
+        pull_amplitude: f64 = 0.0, ONE, (AHEAD..=1.0);
         /// Stiffness that relaxes with the first time constant
         relaxing_stiffness_1: f64 = 0.0, NEWTON_PER_METRE, (0.0..=5e4);
         /// Stiffness that relaxes with the second time constant
@@ -50,6 +50,11 @@ crate::variables::variables! {
         return_ratio: f64 = 1.0, ONE, (0.05..=20.0);
     }
 }
+
+/// Times in s from which on something gives way slowly; before, it is viscous.
+const SLOW: f64 = 0.2;
+/// Drift per contraction of a membrane that would push ahead of its load for good.
+const AHEAD: f64 = -0.5;
 
 impl Creep {
     /// Rate of a drift that goes for `aim` with a time constant.
@@ -74,6 +79,7 @@ impl Effect for Creep {
             &[("creep.pull_amplitude", &[0.15]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.relaxing_stiffness_1", &[1e3]), ("creep.time_1", &[1.5, 10.0])],
         ],
+        further_forms: &[],
         refinements: &[
             ("creep.amplitude_2", &[0.05]),
             ("creep.time_2", &[15.0, 0.5]),
@@ -92,6 +98,11 @@ impl Effect for Creep {
     fn is_neutral(&self) -> bool {
         [self.amplitude_1, self.amplitude_2, self.pull_amplitude, self.relaxing_stiffness_1, self.relaxing_stiffness_2]
             == [0.0; 5]
+    }
+
+    // The second element may be a small part of the whole, and fast.
+    fn is_plausible(&self) -> bool {
+        self.time_1 > SLOW && self.amplitude_1 > AHEAD && self.amplitude_2 > AHEAD
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {

@@ -59,6 +59,7 @@ impl Effect for EndEffects {
             &[("end_effects.excess", &[0.1, 0.02, -0.02])],
             &[("end_effects.excess", &[0.1, 0.02, -0.02]), ("end_effects.elastic_share", &[0.0])],
         ],
+        further_forms: &[],
         refinements: &[("end_effects.low_pressure_excess", &[0.05]), ("end_effects.growth", &[0.3])],
     };
 

@@ -110,6 +110,7 @@ impl Effect for FlowLimit {
                 ("flow_limit.critical_ratio", &[0.3]),
             ],
         ],
+        further_forms: &[],
         refinements: &[
             ("flow_limit.roundness", &[0.3]),
             ("flow_limit.emptying_with_pressure", &[0.3]),

@@ -38,6 +38,7 @@ impl Effect for ForceGain {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("force_gain.relative_error", &[0.08, -0.08, 0.02, -0.02])]],
+        further_forms: &[],
         refinements: &[("force_gain.bend", &[0.005]), ("force_gain.elastic_share", &[0.5])],
     };
 

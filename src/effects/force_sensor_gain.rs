@@ -38,6 +38,7 @@ impl Effect for ForceSensorGain {
             // A gain alone may be what the coefficients of the muscle stand for.
             &[("force_sensor_gain.bend", &[0.02]), ("force_sensor_gain.relative_error", &[0.0])],
         ],
+        further_forms: &[],
         refinements: &[("force_sensor_gain.bend", &[0.005])],
     };
 

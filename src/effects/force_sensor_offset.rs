@@ -1,33 +1,26 @@
-use super::{Description, Effect, Holds, Readings, settling};
+use super::{Description, Effect, Holds, Readings};
+use crate::zero::zero;
 
-crate::variables::variables! {
+zero! {
     /// A force sensor that shows a force where there is none.
     ///
     /// # Model
-    /// F_measured ← F_measured + o (1 + s exp(−t/τ)): `offset` o, `settling_share` s, `settling_time` τ, t since the start.
+    /// F_measured ← F_measured + o c(t), c = 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling_share` s,
+    /// `settling_time` τ, `swing_share` a, `swing_period` T, `swing_phase` φ, `shift_share` j; r goes from 0 to 1 within
+    /// `shift_span` around `shift_time`.
     ///
     /// # In the data
     /// A constant residual of the force, also with the muscle empty; the motion is as nominal.
     ///
     /// # Validity
-    /// Constant, or settling while the sensor warms up from the start of the recording.
+    /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
+    /// once by a shock; in every recording alike, from its start.
     ///
     /// # Reference
     /// Definition of an offset.
-    pub struct ForceSensorOffset in "force_sensor_offset." as Tunable {
+    pub struct ForceSensorOffset in "force_sensor_offset." from 20.0 {
         /// What the force sensor shows without pull
-        offset: f64 = 0.0, NEWTON, (-500.0..=500.0);
-        /// Excess of the offset at the start, relative to the offset that settles
-        settling_share: f64 = 0.0, ONE, (-1.0..=2.0);
-        /// Time constant of the settling
-        settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
-    }
-}
-
-impl ForceSensorOffset {
-    /// What the sensor adds at a time in s since the start.
-    fn zero(&self, time: f64) -> f64 {
-        settling(self.offset, self.settling_share, self.settling_time, time)
+        offset: NEWTON, (-500.0..=500.0);
     }
 }
 
@@ -35,18 +28,23 @@ impl Effect for ForceSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "force_sensor_offset",
         meaning: "the force sensor shows a force where there is none",
-        equation: "F_measured <- F_measured + o (1 + s exp(-t/tau))",
+        equation: "F_measured <- F_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the force, also at rest",
         experiment: "read the sensor with nothing attached",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[&[("force_sensor_offset.offset", &[20.0, -20.0])]],
-        refinements: &[("force_sensor_offset.settling_share", &[0.3]), ("force_sensor_offset.settling_time", &[5.0])],
+        forms: Self::FORMS,
+        further_forms: Self::FURTHER_FORMS,
+        refinements: Self::REFINEMENTS,
     };
 
     fn is_neutral(&self) -> bool {
         self.offset == 0.0
+    }
+
+    fn is_plausible(&self) -> bool {
+        self.course().is_plausible()
     }
 
     fn readings(&self, readings: Readings) -> Readings {
@@ -54,6 +52,6 @@ impl Effect for ForceSensorOffset {
     }
 
     fn sentence(&self) -> String {
-        format!("The force sensor shows {:+.1} N without pull.", self.offset)
+        format!("The force sensor shows {:+.1} N without pull{}.", self.offset, self.course().told())
     }
 }

@@ -106,6 +106,7 @@ impl Effect for FrictionHysteresis {
                 ("friction_hysteresis.smoothing_velocity", &[2e-3]),
             ],
         ],
+        further_forms: &[],
         refinements: &[
             ("friction_hysteresis.second_share", &[0.4]),
             ("friction_hysteresis.second_ratio", &[5.0]),

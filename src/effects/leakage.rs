@@ -73,6 +73,7 @@ impl Effect for Leakage {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("leakage.rate", &[0.3, 1.0])], &[("leakage.rate", &[0.3, 1.0]), ("leakage.choked_share", &[0.5])]],
+        further_forms: &[],
         refinements: &[
             ("leakage.choked_share", &[0.5]),
             ("leakage.volume_growth", &[0.3]),

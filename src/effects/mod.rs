@@ -102,6 +102,8 @@ pub struct Description {
     pub holds: Holds,
     /// Common forms of the effect, each the parameters that a fit frees, its size first; the best form stands for the cause.
     pub forms: &'static [&'static [Freed]],
+    /// Forms that are rarer, and looked at only where one of the common ones leads and leaves something.
+    pub further_forms: &'static [&'static [Freed]],
     /// Parameters that are freed as well once the effect leads, and stay free only where the data pay for them.
     pub refinements: &'static [Freed],
 }
@@ -111,6 +113,11 @@ pub struct Description {
 pub type Freed = (&'static str, &'static [f64]);
 
 impl Description {
+    /// All forms, the common ones first.
+    pub fn all_forms(&self) -> impl Iterator<Item = &'static [Freed]> {
+        self.forms.iter().chain(self.further_forms).copied()
+    }
+
     /// Where the first fit of the first form starts: the effect at work, at a usual size.
     pub fn typical(&self) -> impl Iterator<Item = (&'static str, f64)> {
         self.forms[0].iter().map(|(name, starts)| (*name, starts[0]))
@@ -132,6 +139,10 @@ pub trait Effect: Declared + Default {
     /// Whether its states do not count.
     fn rests(&self) -> bool {
         self.is_neutral()
+    }
+    /// Whether its values are such as the cause can have: fits may try more, and what ends at a bound was not found.
+    fn is_plausible(&self) -> bool {
+        true
     }
     /// One sentence for a person about the size that was found.
     fn sentence(&self) -> String;
@@ -272,6 +283,11 @@ macro_rules! effects {
             #[inline]
             pub fn are_neutral(&self) -> bool {
                 true $(&& self.$field.is_neutral())*
+            }
+
+            /// Whether the values of the effect with this name are such as its cause can have.
+            pub fn is_plausible(&self, name: &str) -> bool {
+                true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible()))*
             }
 
             /// Whether the states of all effects rest.
@@ -450,11 +466,6 @@ macro_rules! effects {
             }
         }
     };
-}
-
-/// Zero of something that warms up: o (1 + s exp(-t/τ)), for an offset o, a `share` s and a `time_constant` τ in s.
-fn settling(offset: f64, share: f64, time_constant: f64, time: f64) -> f64 {
-    if share == 0.0 { offset } else { offset * (1.0 + share * (-time / time_constant).exp()) }
 }
 
 // One line per effect: adding one is its file and a line here. In the order of the signal.

@@ -35,6 +35,7 @@ impl Effect for PayloadMass {
         of_load: true,
         holds: Holds::Exactly,
         forms: &[&[("payload_mass.additional_mass", &[2.0, -2.0])], &[("payload_mass.relative_error", &[0.1, -0.1])]],
+        further_forms: &[],
         refinements: &[
             ("payload_mass.additional_mass", &[0.5]),
             ("payload_mass.relative_error", &[0.02]),

@@ -38,6 +38,7 @@ impl Effect for PressureSensorGain {
             // A gain alone may be what the coefficients of the muscle stand for.
             &[("pressure_sensor_gain.bend", &[0.02]), ("pressure_sensor_gain.relative_error", &[0.0])],
         ],
+        further_forms: &[],
         refinements: &[("pressure_sensor_gain.bend", &[0.005])],
     };
 

@@ -53,6 +53,7 @@ impl Effect for SeriesElasticity {
             &[("series_elasticity.load_compliance", &[5e-6])],
             &[("series_elasticity.compliance", &[-5e-6, 5e-6])],
         ],
+        further_forms: &[],
         refinements: &[("series_elasticity.exponent", &[0.8])],
     };
 

@@ -58,6 +58,7 @@ impl Effect for SupplySaturation {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("supply_saturation.gauge_pressure", CEILINGS)]],
+        further_forms: &[],
         refinements: &[
             ("supply_saturation.rounding", &[3e3]),
             ("supply_saturation.droop", &[0.01, 0.1]),

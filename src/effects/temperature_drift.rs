@@ -1,28 +1,37 @@
 use super::{Description, Effect, Holds, Point};
 
+/// Power in W of the motion for which changes by work are stated.
+const REFERENCE_POWER: f64 = 10.0;
+
+/// Time constant in s within which no muscle warms up.
+const FASTEST: f64 = 3.0;
+
 crate::variables::variables! {
     /// Slow change while the muscle warms up.
     ///
     /// # Model
-    /// τ dw/dt = 1 − w from w = 0 at the start; the area counts 1 + a w times, the elastic force 1 + e w times:
-    /// `time_constant` τ, `area_change` a, `elastic_change` e.
+    /// τ dw/dt = 1 − k + k |P|/(10 W) − w from w = 0 at the start, P = F_p dx/dt the power of the pressure's pull F_p
+    /// without effects; the area counts
+    /// 1 + a w times, the elastic force 1 + e w times: `time_constant` τ, `work_share` k, `area_change` a, `elastic_change` e.
     ///
     /// # In the data
     /// One cycle differs from the next, the less the later; the force residual grows from zero at the start and stays.
     /// Creep comes back after every step.
     ///
     /// # Validity
-    /// The recording starts cold. Warmth from work is lumped into one time constant; no muscle warms within less than 3 s.
+    /// The recording starts cold. Its surroundings warm the muscle, or its own work, of which a fixed share becomes heat; no muscle warms within less than 3 s.
     ///
     /// # Reference
-    /// Newton's law of heating; definition.
+    /// Newton's law of cooling; definition.
     pub struct TemperatureDrift in "temperature_drift." as Tunable {
         /// Relative change of the area when warm
         area_change: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Relative change of the elastic force when warm
         elastic_change: f64 = 0.0, ONE, (-0.9..=2.0);
         /// Time constant of the warming
-        time_constant: f64 = 15.0, SECOND, (3.0..=1000.0);
+        time_constant: f64 = 15.0, SECOND, (FASTEST..=1000.0);
+        /// Share of the warming that goes with the power of its motion, stated for 10 W
+        work_share: f64 = 0.0, ONE, (0.0..=1.0);
     }
 }
 
@@ -30,16 +39,21 @@ impl Effect for TemperatureDrift {
     const DESCRIPTION: Description = Description {
         name: "temperature_drift",
         meaning: "slow change of the muscle while it warms up",
-        equation: "tau dw/dt = 1 - w;  A <- A (1 + a w);  F_e <- F_e (1 + e w)",
+        equation: "tau dw/dt = 1 - k + k |P|/(10 W) - w;  A <- A (1 + a w);  F_e <- F_e (1 + e w)",
         signature: "force residual that grows from zero and stays: the first cycle differs from the last",
         experiment: "the same cycle for several minutes, from cold",
         reference: "definition",
         of_load: false,
         holds: Holds::AsLaw,
-        forms: &[&[
-            ("temperature_drift.area_change", &[0.05, -0.05]),
-            ("temperature_drift.time_constant", &[10.0, 25.0]),
-        ]],
+        forms: &[
+            &[("temperature_drift.area_change", &[0.05, -0.05]), ("temperature_drift.time_constant", &[10.0, 25.0])],
+            &[
+                ("temperature_drift.area_change", &[0.05, -0.05]),
+                ("temperature_drift.time_constant", &[15.0]),
+                ("temperature_drift.work_share", &[1.0]),
+            ],
+        ],
+        further_forms: &[],
         refinements: &[("temperature_drift.elastic_change", &[0.05])],
     };
     const STATE_SCALES: &'static [f64] = &[1.0];
@@ -48,8 +62,13 @@ impl Effect for TemperatureDrift {
         self.area_change == 0.0 && self.elastic_change == 0.0
     }
 
-    fn rates(&self, _at: &Point, own: &[f64], rates: &mut [f64]) {
-        rates[0] = (1.0 - own[0]) / self.time_constant;
+    fn is_plausible(&self) -> bool {
+        self.time_constant > FASTEST
+    }
+
+    fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
+        let power = (at.pressure_pull * at.contraction_velocity).abs() / REFERENCE_POWER;
+        rates[0] = (1.0 + self.work_share * (power - 1.0) - own[0]) / self.time_constant;
     }
 
     fn area_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
@@ -61,8 +80,12 @@ impl Effect for TemperatureDrift {
     }
 
     fn sentence(&self) -> String {
+        let by_work = match 100.0 * self.work_share {
+            0.0 => String::new(),
+            share => format!(", {share:.0} % of it by its own work, told for 10 W"),
+        };
         format!(
-            "The muscle changes as it warms up, within {:.0} s: its area by {:+.1} %, its elastic force by {:+.1} %.",
+            "The muscle changes as it warms up within {:.0} s{by_work}: its area by {:+.1} %, its elastic force by {:+.1} %.",
             self.time_constant,
             100.0 * self.area_change,
             100.0 * self.elastic_change

@@ -47,6 +47,7 @@ impl Effect for ThresholdPressure {
                 ("threshold_pressure.exponent", &[4.0]),
             ],
         ],
+        further_forms: &[],
         refinements: &[
             ("threshold_pressure.exponent", &[1.5, 2.5]),
             ("threshold_pressure.decrease_with_contraction", &[0.2]),

@@ -69,6 +69,7 @@ impl Effect for ValveDeadBand {
             &[("valve_dead_band.pressure_overlap", &[5e3])],
             &[("valve_dead_band.pressure_overlap", &[3e3, 8e3, 2e4]), ("valve_dead_band.overlap_steepness", &[10.0])],
         ],
+        further_forms: &[],
         refinements: &[("valve_dead_band.start", &[0.3]), ("valve_dead_band.jump_time", &[2.5e-4, 5e-4, 1e-3, 2.5e-3])],
     };
 

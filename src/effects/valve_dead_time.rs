@@ -35,6 +35,7 @@ impl Effect for ValveDeadTime {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("valve_dead_time.delay", &[0.03, 0.1])]],
+        further_forms: &[],
         refinements: &[("valve_dead_time.falling_excess", &[0.3, -0.3])],
     };
 

@@ -48,6 +48,7 @@ impl Effect for ValveGain {
                 ("valve_gain.knee", &[1.2, 1.8, 2.6, 1.2, 1.8, 2.6]),
             ],
         ],
+        further_forms: &[],
         refinements: &[("valve_gain.bend", &[0.003])],
     };
 

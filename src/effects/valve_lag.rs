@@ -52,6 +52,7 @@ impl Effect for ValveLag {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("valve_lag.time_constant", &[0.05])], &[("valve_lag.second_time_constant", &[0.05])]],
+        further_forms: &[],
         refinements: &[
             ("valve_lag.time_constant", &[0.02]),
             ("valve_lag.second_time_constant", &[0.02]),

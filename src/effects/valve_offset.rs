@@ -1,24 +1,26 @@
 use super::{Description, Effect, Holds, Point};
+use crate::zero::zero;
 
-crate::variables::variables! {
+zero! {
     /// A valve whose zero is off.
     ///
     /// # Model
-    /// u ← u + o (1 + s w), τ dw/dt = −w from w = 1 at the start: `offset` o, `settling_share` s, `settling_time` τ.
+    /// u ← u + o c(t), c = 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling_share` s,
+    /// `settling_time` τ, `swing_share` a, `swing_period` T, `swing_phase` φ, `shift_share` j; r goes from 0 to 1 within
+    /// `shift_span` around `shift_time`.
     ///
     /// # In the data
     /// A constant residual of the pressure, with the force that belongs to it. With an offset of the pressure sensor the
     /// force stays.
     ///
+    /// # Validity
+    /// Constant, settling, swinging or shifted once, as the zeros of sensors; in every recording alike, from its start.
+    ///
     /// # Reference
     /// Zero errors in data sheets of proportional pressure regulators.
-    pub struct ValveOffset in "valve_offset." as Tunable {
+    pub struct ValveOffset in "valve_offset." from 0.1 {
         /// Voltage that acts beyond the command
-        offset: f64 = 0.0, VOLT, (-2.0..=2.0);
-        /// Excess of the offset at the start, relative to the offset that settles
-        settling_share: f64 = 0.0, ONE, (-1.0..=2.0);
-        /// Time constant of the settling
-        settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
+        offset: VOLT, (-2.0..=2.0);
     }
 }
 
@@ -26,14 +28,15 @@ impl Effect for ValveOffset {
     const DESCRIPTION: Description = Description {
         name: "valve_offset",
         meaning: "the zero of the valve is off",
-        equation: "u <- u + o (1 + s exp(-t/tau))",
+        equation: "u <- u + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the pressure, and of the force with it",
         experiment: "stairs of the command with the pressure recorded by a second sensor",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[&[("valve_offset.offset", &[0.1, -0.1])]],
-        refinements: &[("valve_offset.settling_share", &[0.3]), ("valve_offset.settling_time", &[5.0])],
+        forms: Self::FORMS,
+        further_forms: Self::FURTHER_FORMS,
+        refinements: Self::REFINEMENTS,
     };
     const STATE_SCALES: &'static [f64] = &[1.0];
 
@@ -41,23 +44,24 @@ impl Effect for ValveOffset {
         self.offset == 0.0
     }
 
+    fn is_plausible(&self) -> bool {
+        self.course().is_plausible()
+    }
+
     fn rests(&self) -> bool {
-        self.is_neutral() || self.settling_share == 0.0
+        self.is_neutral() || self.course().is_constant()
     }
 
-    fn start(&self, _at: &Point, own: &mut [f64]) {
-        own[0] = 1.0;
-    }
-
-    fn rates(&self, _at: &Point, own: &[f64], rates: &mut [f64]) {
-        rates[0] = -own[0] / self.settling_time;
+    // The state is the time since the start, or since the offset ceased to be constant.
+    fn rates(&self, _at: &Point, _own: &[f64], rates: &mut [f64]) {
+        rates[0] = 1.0;
     }
 
     fn command(&self, _at: &Point, own: &[f64], command: f64) -> f64 {
-        command + self.offset * (1.0 + self.settling_share * own[0])
+        command + self.zero(own[0])
     }
 
     fn sentence(&self) -> String {
-        format!("The valve acts as if its command were {:+.3} V off.", self.offset)
+        format!("The valve acts as if its command were {:+.3} V off{}.", self.offset, self.course().told())
     }
 }

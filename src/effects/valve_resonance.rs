@@ -66,6 +66,7 @@ impl Effect for ValveResonance {
                 ("valve_resonance.main_stage", &[0.06]),
             ],
         ],
+        further_forms: &[],
         refinements: &[("valve_resonance.stiffening", &[0.2]), ("valve_resonance.lead", &[0.5])],
     };
     // Integrated rate of the pilot, and how far it is ahead of the pressure.

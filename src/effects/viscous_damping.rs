@@ -49,6 +49,7 @@ impl Effect for ViscousDamping {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("viscous_damping.contraction", &[200.0]), ("viscous_damping.extension", &[200.0])]],
+        further_forms: &[],
         refinements: &[
             ("viscous_damping.exponent", &[0.2, -0.2]),
             ("viscous_damping.with_pressure", &[0.3]),

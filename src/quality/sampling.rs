@@ -127,7 +127,7 @@ fn slower_than(longest: f64, effects: &[(&str, f64)]) -> Option<String> {
     (!words.is_empty()).then(text)
 }
 
-/// Effects with the longest time, s, from which a fit of theirs starts: what is usual of them.
+/// Effects with the longest time, s, from which a fit of their quickest form starts: what is usual of them.
 fn slow_effects() -> Vec<(&'static str, f64)> {
     let defaults = Parameters::default();
     let is_time = |name: &str| defaults.find(name).is_some_and(|(variable, _)| variable.unit == SECOND);
@@ -136,7 +136,7 @@ fn slow_effects() -> Vec<(&'static str, f64)> {
     };
     Effects::DESCRIPTIONS
         .iter()
-        .map(|effect| (effect.name, effect.forms.iter().map(|form| slowest(form)).fold(0.0, f64::max)))
+        .map(|effect| (effect.name, effect.forms.iter().map(|form| slowest(form)).fold(f64::INFINITY, f64::min)))
         .collect()
 }
 

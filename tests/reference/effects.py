@@ -333,6 +333,47 @@ class SmallTank(Plant):
         return VALVE_BANDWIDTH * (min(target, own[0]) - pressure)
 
 
+class SwingingZero(Plant):
+    """A valve 0.12 V off, and 30 % more or less of it in 8.5 s; the own state is the time."""
+
+    own_scales = (1.0,)
+
+    def own_start(self, x):
+        return [0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [1.0]
+
+    def pressure_rate(self, target, pressure, x, own):
+        volts = 0.12 + 0.036 * np.sin(2 * np.pi / 8.5 * own[0] + 0.7)
+        return VALVE_BANDWIDTH * (target + VALVE_GAIN * volts - pressure)
+
+
+class ShiftingZero(SwingingZero):
+    """A position sensor 4 mm off that slips back by 2.4 mm from 1.9 s to 2.5 s; the own state is the time."""
+
+    pressure_rate = Plant.pressure_rate
+
+    def readings(self, x, force, own):
+        return x + np.interp(own[:, 0], [1.9, 2.5], [4e-3, 1.6e-3])
+
+
+class WarmByWork(Plant):
+    """Warmed by the power of the pressure's pull; 10 W would make it 2 % stronger for good and the membrane 3 % softer."""
+
+    own_scales = (0.1,)
+
+    def own_start(self, x):
+        return [0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(abs(pressure * VIRTUAL_AREA_1000.area(x) * velocity) / 10 - own[0]) / 4.0]
+
+    def static_force(self, pressure, x, own):
+        pull, membrane = pressure * VIRTUAL_AREA_1000.area(x), VIRTUAL_AREA_1000.elastic_force(x)
+        return (1 + 0.02 * own[0]) * pull + (1 - 0.03 * own[0]) * membrane
+
+
 class WrongBore(Plant):
     """8 % stronger threads, 4 % more membrane."""
 
@@ -426,6 +467,9 @@ CASES = [
     Case("leakage", Leakage(), STAIRS),
     Case("lifting_seal", LiftingSeal(), STAIRS),
     Case("small_tank", SmallTank(), STAIRS),
+    Case("swinging_zero", SwingingZero(), STAIRS),
+    Case("shifting_zero", ShiftingZero(), STAIRS),
+    Case("warm_by_work", WarmByWork(), STAIRS),
     Case("wrong_bore", WrongBore(), STAIRS),
     Case("stiff_ends", StiffEnds(), STAIRS),
     Case("counterweight", Counterweight(), STAIRS),

@@ -336,14 +336,17 @@ fn simulated(model: &Parameters, place: Place, recording: &Recording) -> Option<
 /// As [`simulated`]; `None` as well where pressure or contraction leave the limits.
 fn within(model: &Parameters, place: Place, recording: &Recording, limits: &Limits) -> Option<Readings> {
     let readings = simulated(model, place, recording)?;
-    // Zeros that settle count as they are at the start.
-    let true_pressure = |reading: &f64| model.effects.true_pressure(*reading, 0.0);
     let (low, high) = (-0.02 * model.muscle.rest_length, limits.most_contraction(model));
-    let contractions = readings[1].iter().zip(&readings[2]);
-    let true_contraction = |(reading, force): (&f64, &f64)| model.effects.true_contraction(*reading, *force, 0.0);
-    // A simulation of numbers: half a percent is no excess.
-    let fine = readings[0].iter().map(true_pressure).all(|pressure| pressure <= 1.005 * limits.most_pressure)
-        && contractions.map(true_contraction).all(|contraction| (low..=1.005 * high).contains(&contraction));
+    let [pressures, contractions, forces] = &readings;
+    let fine = recording.time.iter().step_by(THINNED).enumerate().all(|(k, time)| {
+        let since = time - recording.time[0];
+        let pressure = pressures.get(k).map(|reading| model.effects.true_pressure(*reading, since));
+        let both = contractions.get(k).zip(forces.get(k));
+        let contraction = both.map(|(reading, force)| model.effects.true_contraction(*reading, *force, since));
+        // A simulation of numbers: half a percent is no excess.
+        pressure.is_none_or(|pressure| pressure <= 1.005 * limits.most_pressure)
+            && contraction.is_none_or(|contraction| (low..=1.005 * high).contains(&contraction))
+    });
     fine.then_some(readings)
 }
 

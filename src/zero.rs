@@ -1,0 +1,177 @@
+//! Zeros of sensors and of the valve, which need not stay where they are while one records.
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// Period in s of the fastest swing that is still a zero's, and not a signal.
+pub(crate) const FASTEST: f64 = 8.0;
+
+/// How a zero goes on over time, relative to the offset that it is stated with.
+pub struct Course {
+    /// Excess at the start, and time constant in s of its settling.
+    pub settling: (f64, f64),
+    /// Share by which it swings, period in s and phase in rad at the start.
+    pub swing: (f64, f64, f64),
+    /// Share by which it shifts once and for all, time in s of the middle of that, and how long in s it takes.
+    pub shift: (f64, f64, f64),
+}
+
+impl Course {
+    /// 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j times how far a ramp over d around t_j has come; before the start as there.
+    pub fn at(&self, time: f64) -> f64 {
+        let time = time.max(0.0);
+        let (settling, constant) = self.settling;
+        let (swing, period, phase) = self.swing;
+        let (shift, middle, lasts) = self.shift;
+        let mut course = 1.0;
+        if settling != 0.0 {
+            course += settling * (-time / constant).exp();
+        }
+        if swing != 0.0 {
+            course += swing * (TAU * time / period + phase).sin();
+        }
+        if shift != 0.0 {
+            course += shift * ((time - middle) / lasts + 0.5).clamp(0.0, 1.0);
+        }
+        course
+    }
+
+    /// Whether it stays where it is.
+    pub fn is_constant(&self) -> bool {
+        self.settling.0 == 0.0 && self.swing.0 == 0.0 && self.shift.0 == 0.0
+    }
+
+    /// Whether it is as slow as zeros are.
+    pub fn is_plausible(&self) -> bool {
+        let (swing, period, _) = self.swing;
+        swing == 0.0 || period > FASTEST
+    }
+
+    /// What follows a sentence about the offset; nothing where it is constant.
+    pub fn told(&self) -> String {
+        let percent = |share: f64| format!("{:.0} %", 100.0 * share.abs());
+        let shows = |share: f64| share.abs() > 0.005;
+        let word = |share: f64| if share < 0.0 { "less" } else { "more" };
+        let (settling, constant) = self.settling;
+        let (swing, period, _) = self.swing;
+        let (shift, middle, _) = self.shift;
+        let mut told = String::new();
+        if shows(settling) {
+            let _ = write!(
+                told,
+                ", {} {} at the start, which settles within {constant:.1} s",
+                percent(settling),
+                word(settling)
+            );
+        }
+        if shows(swing) {
+            let _ = write!(told, ", swinging by ±{} with a period of {period:.0} s", percent(swing));
+        }
+        if shows(shift) {
+            let _ = write!(told, ", {} {} from {middle:.1} s on", percent(shift), word(shift));
+        }
+        told
+    }
+}
+
+/// Parameters of an offset with its course over time, and how fits look for them from an offset of a usual size.
+macro_rules! zero {
+    (
+        $(#[$attribute:meta])*
+        pub struct $Struct:ident in $prefix:literal from $size:literal {
+            #[doc = $description:literal]
+            offset: $unit:ident, $range:expr;
+        }
+    ) => {
+        $crate::variables::variables! {
+            $(#[$attribute])*
+            pub struct $Struct in $prefix as Tunable {
+                #[doc = $description]
+                offset: f64 = 0.0, $unit, $range;
+                /// Excess of the offset at the start, relative to the offset that settles
+                settling_share: f64 = 0.0, ONE, (-1.0..=2.0);
+                /// Time constant of the settling
+                settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
+                /// Share by which the offset swings, as an air conditioner makes it
+                swing_share: f64 = 0.0, ONE, (0.0..=1.0);
+                /// Period of the swing
+                swing_period: f64 = 30.0, SECOND, ($crate::zero::FASTEST..=1000.0);
+                /// Phase of the swing at the start, in rad
+                swing_phase: f64 = 0.0, ONE, (-10.0..=10.0);
+                /// Share by which the offset shifts once, as after a shock
+                shift_share: f64 = 0.0, ONE, (-2.0..=2.0);
+                /// When it shifts: the middle of the shift
+                shift_time: f64 = 10.0, SECOND, (0.0..=10000.0);
+                /// How long the shift takes
+                shift_span: f64 = 0.1, SECOND, (0.01..=10.0);
+            }
+        }
+
+        impl $Struct {
+            const FORMS: &'static [&'static [$crate::effects::Freed]] = &[
+                &[(concat!($prefix, "offset"), &[$size, -$size])],
+                // Corrections of the muscle may take a constant offset over, and leave how it settles.
+                &[
+                    (concat!($prefix, "offset"), &[$size, -$size, $size, -$size]),
+                    (concat!($prefix, "settling_share"), &[0.5]),
+                    (concat!($prefix, "settling_time"), &[4.0, 4.0, 15.0, 15.0]),
+                ],
+            ];
+            const FURTHER_FORMS: &'static [&'static [$crate::effects::Freed]] = &[
+                &[
+                    (concat!($prefix, "offset"), &[$size]),
+                    (concat!($prefix, "swing_share"), &[0.15]),
+                    (concat!($prefix, "swing_period"), $crate::zero::PERIODS),
+                    (concat!($prefix, "swing_phase"), $crate::zero::PHASES),
+                ],
+                &[
+                    (concat!($prefix, "offset"), &[$size]),
+                    (concat!($prefix, "shift_share"), $crate::zero::SHIFTS),
+                    (concat!($prefix, "shift_time"), $crate::zero::TIMES),
+                    (concat!($prefix, "shift_span"), &[2.0]),
+                ],
+            ];
+            const REFINEMENTS: &'static [$crate::effects::Freed] = &[
+                (concat!($prefix, "settling_share"), &[0.3]),
+                (concat!($prefix, "settling_time"), &[5.0]),
+            ];
+
+            /// What is added at a time in s since the start.
+            fn zero(&self, time: f64) -> f64 {
+                self.offset * self.course().at(time)
+            }
+
+            fn course(&self) -> $crate::zero::Course {
+                $crate::zero::Course {
+                    settling: (self.settling_share, self.settling_time),
+                    swing: (self.swing_share, self.swing_period, self.swing_phase),
+                    shift: (self.shift_share, self.shift_time, self.shift_span),
+                }
+            }
+        }
+    };
+}
+pub(crate) use zero;
+
+/// Where fits of a swing start: every period in s with four phases.
+#[rustfmt::skip]
+pub(crate) const PERIODS: &[f64] = &[
+    10.0, 10.0, 10.0, 10.0, 16.0, 16.0, 16.0, 16.0, 25.0, 25.0,
+    25.0, 25.0, 40.0, 40.0, 40.0, 40.0, 65.0, 65.0, 65.0, 65.0,
+];
+#[rustfmt::skip]
+pub(crate) const PHASES: &[f64] = &[
+    0.0, 1.5, 3.0, -1.5, 0.0, 1.5, 3.0, -1.5, 0.0, 1.5,
+    3.0, -1.5, 0.0, 1.5, 3.0, -1.5, 0.0, 1.5, 3.0, -1.5,
+];
+/// Where fits of a shift start: times in s, each with a shift up and one down.
+#[rustfmt::skip]
+pub(crate) const TIMES: &[f64] = &[
+    3.0, 3.0, 6.0, 6.0, 9.0, 9.0, 12.0, 12.0, 15.0, 15.0, 18.0, 18.0, 21.0, 21.0, 24.0, 24.0,
+    27.0, 27.0, 30.0, 30.0, 34.0, 34.0, 38.0, 38.0, 43.0, 43.0, 50.0, 50.0, 60.0, 60.0, 75.0, 75.0,
+];
+#[rustfmt::skip]
+pub(crate) const SHIFTS: &[f64] = &[
+    0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4,
+    0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4,
+];
