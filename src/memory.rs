@@ -228,6 +228,8 @@ pub struct Slack {
     pub stiction: f64,
     /// How long a jump takes, s: it lands where the line is by then.
     pub jump_time: f64,
+    /// Speed of the command above which a pilot that broke loose slides on, V/s.
+    pub sliding_speed: f64,
     /// Where in its play the pilot starts, as a share of the half width.
     pub start: f64,
 }
@@ -251,23 +253,29 @@ struct Pilot {
     stuck_at: f64,
     /// How long the command has been steep since the pilot broke loose, s, negative where it falls; 0 where it is not.
     steep: f64,
+    /// Direction in which it slides: 1 up, -1 down; 0 where it sticks.
+    slides: f64,
 }
 
 impl Pilot {
     fn at_rest(slack: &Slack, command: f64) -> Self {
         let behind_play = slack.half_widths().map(|half_width| command + half_width * slack.start);
-        Self { behind_play, stuck_at: command + slack.play * slack.start, steep: 0.0 }
+        Self { behind_play, stuck_at: command + slack.play * slack.start, steep: 0.0, slides: 0.0 }
     }
 
     /// Follows a line of the command, and tells the lines that come of it.
     fn follow(&mut self, slack: &Slack, line: Line, mut tell: impl FnMut(Line)) {
-        let Self { behind_play, stuck_at, steep } = self;
+        let Self { behind_play, stuck_at, steep, slides } = self;
         follow_with_plays(behind_play, slack.half_widths(), line, |line| {
-            if slack.stiction > 0.0 {
-                let threshold = slack.stiction + slack.jump_time * line.slope.abs();
-                follow_with_stiction(stuck_at, steep, threshold, line, &mut tell);
-            } else {
+            let threshold = slack.stiction + slack.jump_time * line.slope.abs();
+            if slack.stiction == 0.0 {
                 tell(line);
+            } else if line.slope.abs() > slack.sliding_speed {
+                *steep = 0.0;
+                slide(stuck_at, slides, threshold, line, &mut tell);
+            } else {
+                *slides = 0.0;
+                follow_with_stiction(stuck_at, steep, threshold, line, &mut tell);
             }
         });
     }
@@ -335,6 +343,20 @@ fn follow_with_stiction(position: &mut f64, steep: &mut f64, threshold: f64, lin
     }
     if moves < loose.span {
         jump_along(position, threshold, loose.from(moves), tell);
+    }
+}
+
+/// Stiction of a pilot that, once it is loose, goes with the line for as long as that keeps its direction.
+fn slide(position: &mut f64, slides: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
+    let direction = line.slope.signum();
+    let rest = if *slides == direction { 0.0 } else { rest_until_off(*position, threshold, &line).max(0.0) };
+    if rest > 0.0 {
+        *slides = 0.0;
+        tell(Line { span: line.span.min(rest), value: *position, slope: 0.0, ..line });
+    }
+    if rest < line.span {
+        (*slides, *position) = (direction, line.at(line.span));
+        tell(line.from(rest));
     }
 }
 
@@ -456,9 +478,9 @@ impl Memory for PlantMemory {
 
     fn save(&self, saved: &mut Vec<f64>) {
         saved.push(f64::from(u8::from(self.pilot.is_some())));
-        if let Some(Pilot { behind_play, stuck_at, steep }) = self.pilot {
+        if let Some(Pilot { behind_play, stuck_at, steep, slides }) = self.pilot {
             saved.extend(behind_play);
-            saved.extend([stuck_at, steep]);
+            saved.extend([stuck_at, steep, slides]);
         }
         self.command.save(saved);
         self.contraction.save(saved);
@@ -469,8 +491,8 @@ impl Memory for PlantMemory {
             [0.0, rest @ ..] => (None, rest),
             [1.0, rest @ ..] => {
                 let (behind_play, rest) = rest.split_first_chunk()?;
-                let (&[stuck_at, steep], rest) = rest.split_first_chunk()?;
-                (Some(Pilot { behind_play: *behind_play, stuck_at, steep }), rest)
+                let (&[stuck_at, steep, slides], rest) = rest.split_first_chunk()?;
+                (Some(Pilot { behind_play: *behind_play, stuck_at, steep, slides }), rest)
             }
             _ => return None,
         };

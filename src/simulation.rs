@@ -133,8 +133,8 @@ struct Motion<'a> {
     parameters: &'a Parameters,
     /// Readings without their delay, m.
     readings: Vec<f64>,
-    /// When they were taken, s since the start.
-    time: Vec<f64>,
+    /// When they were shown, s since the start.
+    shown: Vec<f64>,
     /// Velocity in m/s; the rate at which something in series stretches is neglected.
     velocity: Vec<f64>,
 }
@@ -151,14 +151,15 @@ impl<'a> Motion<'a> {
             readings = ahead(time, &readings, late);
         }
         undo_rest_in_means(&since, &mut readings, first, averaging);
+        let shown: Vec<f64> = since.iter().map(|since| since + late).collect();
         let unstretched = |(reading, time): (&f64, &f64)| parameters.effects.true_contraction(*reading, 0.0, *time);
-        let unstretched: Vec<f64> = readings.iter().zip(&since).map(unstretched).collect();
-        Self { parameters, velocity: slopes(time, &unstretched), readings, time: since }
+        let unstretched: Vec<f64> = readings.iter().zip(&shown).map(unstretched).collect();
+        Self { parameters, velocity: slopes(time, &unstretched), readings, shown }
     }
 
     /// Contraction in m at a sample, while the muscle pulls with a force in N.
     fn contraction(&self, sample: usize, pull: f64) -> f64 {
-        self.parameters.effects.true_contraction(self.readings[sample], pull, self.time[sample])
+        self.parameters.effects.true_contraction(self.readings[sample], pull, self.shown[sample])
     }
 
     /// What tells the pull of the muscle, where the contraction behind a reading depends on it.

@@ -54,6 +54,7 @@ pub mod units {
         PER_SECOND = "1/s", "Rate", 1.0, [0, 0, -1, 0, 0];
         PER_VOLT = "1/V", "GainSlope", 0.1, [-1, -2, 3, 1, 0];
         VOLT = "V", "Voltage", 1.0, [1, 2, -3, -1, 0];
+        VOLT_PER_SECOND = "V/s", "VoltageRate", 1.0, [1, 2, -4, -1, 0];
         PASCAL_PER_VOLT = "Pa/V", "ValveGain", 1e5, [0, -3, 1, 1, 0];
         RADIAN_PER_SECOND = "rad/s", "AngularFrequency", 10.0, [0, 0, -1, 0, 1];
         VOLT_PER_METRE = "V/m", "ProportionalGain", 1.0, [1, 1, -3, -1, 0];

@@ -6,39 +6,46 @@ use std::fmt::Write;
 /// Period in s of the fastest swing that is still a zero's, and not a signal.
 pub(crate) const FASTEST: f64 = 8.0;
 
-/// How a zero goes on over time, relative to the offset that it is stated with.
+/// How a zero goes on over time, in the unit of the offset.
 pub struct Course {
+    /// Where it stays when nothing else is at work.
+    pub offset: f64,
     /// Excess at the start, and time constant in s of its settling.
     pub settling: (f64, f64),
-    /// Share by which it swings, period in s and phase in rad at the start.
+    /// Amplitude by which it swings, period in s and phase in rad at the start.
     pub swing: (f64, f64, f64),
-    /// Share by which it shifts once and for all, time in s of the middle of that, and how long in s it takes.
+    /// By how much it shifts once and for all, time in s of the middle of that, and how long in s it takes.
     pub shift: (f64, f64, f64),
 }
 
 impl Course {
-    /// 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j times how far a ramp over d around t_j has come; before the start as there.
+    /// o + s exp(−t/τ) + a sin(2π t/T + φ) + j times how far a ramp over d around t_j has come; before the start as there.
     pub fn at(&self, time: f64) -> f64 {
         let time = time.max(0.0);
         let (settling, constant) = self.settling;
         let (swing, period, phase) = self.swing;
         let (shift, middle, lasts) = self.shift;
-        let mut course = 1.0;
+        let mut zero = self.offset;
         if settling != 0.0 {
-            course += settling * (-time / constant).exp();
+            zero += settling * (-time / constant).exp();
         }
         if swing != 0.0 {
-            course += swing * (TAU * time / period + phase).sin();
+            zero += swing * (TAU * time / period + phase).sin();
         }
         if shift != 0.0 {
-            course += shift * ((time - middle) / lasts + 0.5).clamp(0.0, 1.0);
+            zero += shift * ((time - middle) / lasts + 0.5).clamp(0.0, 1.0);
         }
-        course
+        zero
     }
 
     /// Whether it stays where it is.
     pub fn is_constant(&self) -> bool {
         self.settling.0 == 0.0 && self.swing.0 == 0.0 && self.shift.0 == 0.0
+    }
+
+    /// Whether it is always right.
+    pub fn is_neutral(&self) -> bool {
+        self.offset == 0.0 && self.is_constant()
     }
 
     /// Whether it is as slow as zeros are.
@@ -47,28 +54,21 @@ impl Course {
         swing == 0.0 || period > FASTEST
     }
 
-    /// What follows a sentence about the offset; nothing where it is constant.
-    pub fn told(&self) -> String {
-        let percent = |share: f64| format!("{:.0} %", 100.0 * share.abs());
-        let shows = |share: f64| share.abs() > 0.005;
-        let word = |share: f64| if share < 0.0 { "less" } else { "more" };
+    /// What follows a sentence about the offset, whose amounts are told with their unit; nothing where it is constant.
+    pub fn told(&self, amount: impl Fn(f64) -> String) -> String {
         let (settling, constant) = self.settling;
         let (swing, period, _) = self.swing;
         let (shift, middle, _) = self.shift;
         let mut told = String::new();
-        if shows(settling) {
-            let _ = write!(
-                told,
-                ", {} {} at the start, which settles within {constant:.1} s",
-                percent(settling),
-                word(settling)
-            );
+        if settling != 0.0 {
+            let _ = write!(told, ", {} on top at the start, which settles within {constant:.1} s", amount(settling));
         }
-        if shows(swing) {
-            let _ = write!(told, ", swinging by ±{} with a period of {period:.0} s", percent(swing));
+        if swing != 0.0 {
+            let either_way = amount(swing).replace('+', "±");
+            let _ = write!(told, ", swinging by {either_way} with a period of {period:.0} s");
         }
-        if shows(shift) {
-            let _ = write!(told, ", {} {} from {middle:.1} s on", percent(shift), word(shift));
+        if shift != 0.0 {
+            let _ = write!(told, ", shifted by {} from {middle:.1} s on", amount(shift));
         }
         told
     }
@@ -80,26 +80,26 @@ macro_rules! zero {
         $(#[$attribute:meta])*
         pub struct $Struct:ident in $prefix:literal from $size:literal {
             #[doc = $description:literal]
-            offset: $unit:ident, $range:expr;
+            offset: $unit:ident, $most:literal;
         }
     ) => {
         $crate::variables::variables! {
             $(#[$attribute])*
             pub struct $Struct in $prefix as Tunable {
                 #[doc = $description]
-                offset: f64 = 0.0, $unit, $range;
-                /// Excess of the offset at the start, relative to the offset that settles
-                settling_share: f64 = 0.0, ONE, (-1.0..=2.0);
+                offset: f64 = 0.0, $unit, (-$most..=$most);
+                /// Excess of the offset at the start, which settles
+                settling: f64 = 0.0, $unit, (-$most..=$most);
                 /// Time constant of the settling
                 settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
-                /// Share by which the offset swings, as an air conditioner makes it
-                swing_share: f64 = 0.0, ONE, (0.0..=1.0);
+                /// Amplitude by which the offset swings, as an air conditioner makes it
+                swing: f64 = 0.0, $unit, (0.0..=$most);
                 /// Period of the swing
                 swing_period: f64 = 30.0, SECOND, ($crate::zero::FASTEST..=1000.0);
                 /// Phase of the swing at the start, in rad
                 swing_phase: f64 = 0.0, ONE, (-10.0..=10.0);
-                /// Share by which the offset shifts once, as after a shock
-                shift_share: f64 = 0.0, ONE, (-2.0..=2.0);
+                /// By how much the offset shifts once, as after a shock
+                shift: f64 = 0.0, $unit, (-$most..=$most);
                 /// When it shifts: the middle of the shift
                 shift_time: f64 = 10.0, SECOND, (0.0..=10000.0);
                 /// How long the shift takes
@@ -108,44 +108,30 @@ macro_rules! zero {
         }
 
         impl $Struct {
-            const FORMS: &'static [&'static [$crate::effects::Freed]] = &[
-                &[(concat!($prefix, "offset"), &[$size, -$size])],
-                // Corrections of the muscle may take a constant offset over, and leave how it settles.
-                &[
-                    (concat!($prefix, "offset"), &[$size, -$size, $size, -$size]),
-                    (concat!($prefix, "settling_share"), &[0.5]),
-                    (concat!($prefix, "settling_time"), &[4.0, 4.0, 15.0, 15.0]),
-                ],
-            ];
+            const CONSTANT: &'static [$crate::effects::Freed] = &[(concat!($prefix, "offset"), &[$size, -$size])];
             const FURTHER_FORMS: &'static [&'static [$crate::effects::Freed]] = &[
                 &[
                     (concat!($prefix, "offset"), &[$size]),
-                    (concat!($prefix, "swing_share"), &[0.15]),
+                    (concat!($prefix, "swing"), &[0.1 * $size]),
                     (concat!($prefix, "swing_period"), $crate::zero::PERIODS),
                     (concat!($prefix, "swing_phase"), $crate::zero::PHASES),
                 ],
                 &[
                     (concat!($prefix, "offset"), &[$size]),
-                    (concat!($prefix, "shift_share"), $crate::zero::SHIFTS),
+                    (concat!($prefix, "shift"), &$crate::zero::either_way(0.2 * $size)),
                     (concat!($prefix, "shift_time"), $crate::zero::TIMES),
                     (concat!($prefix, "shift_span"), &[2.0]),
                 ],
             ];
-            const REFINEMENTS: &'static [$crate::effects::Freed] = &[
-                (concat!($prefix, "settling_share"), &[0.3]),
-                (concat!($prefix, "settling_time"), &[5.0]),
-            ];
-
-            /// What is added at a time in s since the start.
-            fn zero(&self, time: f64) -> f64 {
-                self.offset * self.course().at(time)
-            }
+            const REFINEMENTS: &'static [$crate::effects::Freed] =
+                &[(concat!($prefix, "settling"), &[0.3 * $size]), (concat!($prefix, "settling_time"), &[5.0])];
 
             fn course(&self) -> $crate::zero::Course {
                 $crate::zero::Course {
-                    settling: (self.settling_share, self.settling_time),
-                    swing: (self.swing_share, self.swing_period, self.swing_phase),
-                    shift: (self.shift_share, self.shift_time, self.shift_span),
+                    offset: self.offset,
+                    settling: (self.settling, self.settling_time),
+                    swing: (self.swing, self.swing_period, self.swing_phase),
+                    shift: (self.shift, self.shift_time, self.shift_span),
                 }
             }
         }
@@ -164,14 +150,20 @@ pub(crate) const PHASES: &[f64] = &[
     0.0, 1.5, 3.0, -1.5, 0.0, 1.5, 3.0, -1.5, 0.0, 1.5,
     3.0, -1.5, 0.0, 1.5, 3.0, -1.5, 0.0, 1.5, 3.0, -1.5,
 ];
-/// Where fits of a shift start: times in s, each with a shift up and one down.
+/// Where fits of a shift start: times in s, each twice.
 #[rustfmt::skip]
 pub(crate) const TIMES: &[f64] = &[
     3.0, 3.0, 6.0, 6.0, 9.0, 9.0, 12.0, 12.0, 15.0, 15.0, 18.0, 18.0, 21.0, 21.0, 24.0, 24.0,
     27.0, 27.0, 30.0, 30.0, 34.0, 34.0, 38.0, 38.0, 43.0, 43.0, 50.0, 50.0, 60.0, 60.0, 75.0, 75.0,
 ];
-#[rustfmt::skip]
-pub(crate) const SHIFTS: &[f64] = &[
-    0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4,
-    0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4, 0.4, -0.4,
-];
+
+/// A shift up and one down for each of these times.
+pub(crate) const fn either_way(size: f64) -> [f64; TIMES.len()] {
+    let mut sizes = [size; TIMES.len()];
+    let mut k = 1;
+    while k < sizes.len() {
+        sizes[k] = -size;
+        k += 2;
+    }
+    sizes
+}

@@ -208,8 +208,8 @@ fn a_saved_memory_that_cannot_be_is_refused() {
         for length in 0..saved.len() {
             quiet.restore(&saved[..length]).unwrap_err();
         }
-        // The end of the fixed part: whether there is a pilot, and after its seven numbers that of the pieces.
-        let (pilot, pieces) = (fixed - 3, fixed + 5);
+        // The end of the fixed part: whether there is a pilot, and after its eight numbers that of the pieces.
+        let (pilot, pieces) = (fixed - 3, fixed + 6);
         for (position, value) in
             [(pilot, 2.0), (pieces, 1e9), (pieces, 0.5), (pieces, -1.0), (saved.len() - 1, f64::NAN)]
         {
@@ -302,10 +302,10 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
         ("valve_resonance.lead", 0.5),
         ("temperature_drift.time_constant", 5.0),
         ("temperature_drift.work_share", 0.5),
-        ("valve_offset.settling_share", 0.5),
-        ("valve_offset.swing_share", 0.5),
-        ("contraction_sensor_offset.swing_share", 0.5),
-        ("pressure_sensor_offset.shift_share", 0.5),
+        ("valve_offset.settling_time", 5.0),
+        ("valve_offset.swing_period", 9.0),
+        ("contraction_sensor_offset.swing_phase", 0.5),
+        ("pressure_sensor_offset.shift_time", 5.0),
     ] {
         moved.set(parameter, value).unwrap();
     }

@@ -104,6 +104,14 @@ fn effects_agree_with_scipy() {
         ("spread_play", &[("valve_dead_band.play", 0.11), ("valve_dead_band.play_spread", 0.8)]),
         ("stiction", &[("valve_dead_band.stiction", 0.17)]),
         ("late_stiction", &[("valve_dead_band.stiction", 0.17), ("valve_dead_band.jump_time", 0.01)]),
+        (
+            "sliding",
+            &[
+                ("valve_dead_band.stiction", 0.12),
+                ("valve_dead_band.play", 0.04),
+                ("valve_dead_band.sliding_speed", 1e-3),
+            ],
+        ),
         ("overlap", &[("valve_dead_band.pressure_overlap", 6e3), ("valve_dead_band.overlap_steepness", 3.0)]),
         (
             "flow_limit",
@@ -140,7 +148,7 @@ fn effects_agree_with_scipy() {
             "swinging_zero",
             &[
                 ("valve_offset.offset", 0.12),
-                ("valve_offset.swing_share", 0.3),
+                ("valve_offset.swing", 0.036),
                 ("valve_offset.swing_period", 8.5),
                 ("valve_offset.swing_phase", 0.7),
             ],
@@ -149,7 +157,7 @@ fn effects_agree_with_scipy() {
             "shifting_zero",
             &[
                 ("contraction_sensor_offset.offset", 4e-3),
-                ("contraction_sensor_offset.shift_share", -0.6),
+                ("contraction_sensor_offset.shift", -2.4e-3),
                 ("contraction_sensor_offset.shift_time", 2.2),
                 ("contraction_sensor_offset.shift_span", 0.6),
             ],

@@ -87,6 +87,11 @@ impl Part {
         self.effect.all_forms().nth(self.form).unwrap_or_default()
     }
 
+    /// Whether its form is none of the common ones.
+    pub fn is_rare(self) -> bool {
+        self.form >= self.effect.forms.len()
+    }
+
     /// The parameter of its form that stands for its size.
     fn size(self) -> &'static Freed {
         &self.in_form()[0]

@@ -330,13 +330,21 @@ impl<'a, 'b> Search<'a, 'b> {
             let part = Part { form, refined: Refined::Not, ..*last };
             let start = self.bench.best_start(&judged.fitted.parameters, *last, part)?;
             let hypothesis = judged.fitted.hypothesis.without(last.effect.name).with(part);
-            Some(self.judge(self.bench.rough_fit(&hypothesis, &start)?))
+            let fitted = self.bench.rough_fit(&hypothesis, &start)?;
+            (!self.may_be_driven(&fitted, part)).then(|| self.judge(fitted))
         });
         fits.max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
+    /// Whether what an effect does in a rare form may as well come from what drives the muscle.
+    fn may_be_driven(&self, fitted: &Fitted, part: Part) -> bool {
+        let effects = &fitted.parameters.effects;
+        part.is_rare() && self.bench.data.goes_with_inputs(|time| effects.own_course(part.effect.name, time))
+    }
+
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
-    /// for them. What hid refinements of an earlier effect may have been the last one.
+    /// for them. What hid refinements of an earlier effect may have been the last one. A rare form with refinements would fit
+    /// whatever is slow, and has none.
     fn refined(&self, judged: Judged) -> Judged {
         let parts = (0..judged.fitted.hypothesis.parts.len()).rev();
         parts.fold(judged, |judged, which| self.part_refined(judged, which))
@@ -344,6 +352,9 @@ impl<'a, 'b> Search<'a, 'b> {
 
     fn part_refined(&self, judged: Judged, which: usize) -> Judged {
         let part = judged.fitted.hypothesis.parts[which];
+        if part.is_rare() {
+            return judged;
+        }
         let each = (0..part.effect.refinements.len()).map(Refined::By);
         let ways: Vec<_> = match part.refined {
             Refined::Not => [Refined::Not, Refined::Fully].into_iter().chain(each).collect(),

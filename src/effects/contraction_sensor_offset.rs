@@ -5,8 +5,8 @@ zero! {
     /// A position sensor whose zero is not at the rest length.
     ///
     /// # Model
-    /// x_measured ← x_measured + o c(t), c = 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling_share` s,
-    /// `settling_time` τ, `swing_share` a, `swing_period` T, `swing_phase` φ, `shift_share` j; r goes from 0 to 1 within
+    /// x_measured ← x_measured + o + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling` s,
+    /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
     /// `shift_span` around `shift_time`.
     ///
     /// # In the data
@@ -20,7 +20,7 @@ zero! {
     /// Definition of an offset.
     pub struct ContractionSensorOffset in "contraction_sensor_offset." from 5e-3 {
         /// What the position sensor shows at rest length
-        offset: METRE, (-0.2..=0.2);
+        offset: METRE, 0.2;
     }
 }
 
@@ -28,34 +28,47 @@ impl Effect for ContractionSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "contraction_sensor_offset",
         meaning: "the zero of the position sensor is not at the rest length",
-        equation: "x_measured <- x_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
+        equation: "x_measured <- x_measured + o + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the contraction, also at rest",
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: Self::FORMS,
+        forms: &[
+            Self::CONSTANT,
+            // Corrections of the muscle take a constant offset over, and leave how it settles.
+            &[
+                ("contraction_sensor_offset.offset", &[5e-3, -5e-3, 5e-3, -5e-3]),
+                ("contraction_sensor_offset.settling", &[2.5e-3, -2.5e-3, 2.5e-3, -2.5e-3]),
+                ("contraction_sensor_offset.settling_time", &[4.0, 4.0, 15.0, 15.0]),
+            ],
+        ],
         further_forms: Self::FURTHER_FORMS,
         refinements: Self::REFINEMENTS,
     };
 
     fn is_neutral(&self) -> bool {
-        self.offset == 0.0
+        self.course().is_neutral()
     }
 
     fn is_plausible(&self) -> bool {
         self.course().is_plausible()
     }
 
+    fn own_course(&self, time: f64) -> f64 {
+        self.course().at(time)
+    }
+
     fn readings(&self, readings: Readings) -> Readings {
-        Readings { contraction: readings.contraction + self.zero(readings.time), ..readings }
+        Readings { contraction: readings.contraction + self.course().at(readings.time), ..readings }
     }
 
     fn true_contraction(&self, reading: f64, _force: f64, time: f64) -> f64 {
-        reading - self.zero(time)
+        reading - self.course().at(time)
     }
 
     fn sentence(&self) -> String {
-        format!("The position sensor shows {:+.2} mm at the rest length{}.", self.offset * 1e3, self.course().told())
+        let amount = |value: f64| format!("{:+.2} mm", value * 1e3);
+        format!("The position sensor shows {} at the rest length{}.", amount(self.offset), self.course().told(amount))
     }
 }

@@ -5,8 +5,8 @@ zero! {
     /// A force sensor that shows a force where there is none.
     ///
     /// # Model
-    /// F_measured ← F_measured + o c(t), c = 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling_share` s,
-    /// `settling_time` τ, `swing_share` a, `swing_period` T, `swing_phase` φ, `shift_share` j; r goes from 0 to 1 within
+    /// F_measured ← F_measured + o + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling` s,
+    /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
     /// `shift_span` around `shift_time`.
     ///
     /// # In the data
@@ -20,7 +20,7 @@ zero! {
     /// Definition of an offset.
     pub struct ForceSensorOffset in "force_sensor_offset." from 20.0 {
         /// What the force sensor shows without pull
-        offset: NEWTON, (-500.0..=500.0);
+        offset: NEWTON, 500.0;
     }
 }
 
@@ -28,30 +28,35 @@ impl Effect for ForceSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "force_sensor_offset",
         meaning: "the force sensor shows a force where there is none",
-        equation: "F_measured <- F_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
+        equation: "F_measured <- F_measured + o + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the force, also at rest",
         experiment: "read the sensor with nothing attached",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: Self::FORMS,
+        forms: &[Self::CONSTANT],
         further_forms: Self::FURTHER_FORMS,
         refinements: Self::REFINEMENTS,
     };
 
     fn is_neutral(&self) -> bool {
-        self.offset == 0.0
+        self.course().is_neutral()
     }
 
     fn is_plausible(&self) -> bool {
         self.course().is_plausible()
     }
 
+    fn own_course(&self, time: f64) -> f64 {
+        self.course().at(time)
+    }
+
     fn readings(&self, readings: Readings) -> Readings {
-        Readings { force: readings.force + self.zero(readings.time), ..readings }
+        Readings { force: readings.force + self.course().at(readings.time), ..readings }
     }
 
     fn sentence(&self) -> String {
-        format!("The force sensor shows {:+.1} N without pull{}.", self.offset, self.course().told())
+        let amount = |value: f64| format!("{:+.1} N", value);
+        format!("The force sensor shows {} without pull{}.", amount(self.offset), self.course().told(amount))
     }
 }

@@ -96,6 +96,10 @@ impl Effect for Leakage {
 
     fn sentence(&self) -> String {
         let at_two_bar = self.rate * self.flow(REFERENCE_PRESSURE);
-        format!("The muscle leaks: at 2 bar it loses {:.2} bar per second.", at_two_bar * 1e-5)
+        let told = match at_two_bar {
+            large if large >= 1e3 => format!("{:.2} bar", large * 1e-5),
+            small => format!("{:.2} mbar", small * 1e-2),
+        };
+        format!("The muscle leaks: at 2 bar it loses {told} per second.")
     }
 }

@@ -144,6 +144,10 @@ pub trait Effect: Declared + Default {
     fn is_plausible(&self) -> bool {
         true
     }
+    /// What it does at a time in s since the start whatever the muscle does, where it goes its own way over time; SI.
+    fn own_course(&self, _time: f64) -> f64 {
+        0.0
+    }
     /// One sentence for a person about the size that was found.
     fn sentence(&self) -> String;
 
@@ -290,6 +294,12 @@ macro_rules! effects {
                 true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible()))*
             }
 
+            /// What the effect with this name does at a time in s since the start whatever the muscle does; SI.
+            pub fn own_course(&self, name: &str, time: f64) -> f64 {
+                $(if $Effect::DESCRIPTION.name == name { return self.$field.own_course(time); })*
+                0.0
+            }
+
             /// Whether the states of all effects rest.
             #[inline]
             pub fn are_stateless(&self) -> bool {
@@ -340,6 +350,7 @@ macro_rules! effects {
                     all.play_spread += slack.play_spread;
                     all.stiction += slack.stiction;
                     all.jump_time += slack.jump_time;
+                    all.sliding_speed += slack.sliding_speed;
                     all.start += slack.start;
                 )*
                 all

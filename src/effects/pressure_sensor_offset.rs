@@ -5,8 +5,8 @@ zero! {
     /// A pressure sensor whose zero is not at ambient pressure.
     ///
     /// # Model
-    /// p_measured ← p_measured + o c(t), c = 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling_share` s,
-    /// `settling_time` τ, `swing_share` a, `swing_period` T, `swing_phase` φ, `shift_share` j; r goes from 0 to 1 within
+    /// p_measured ← p_measured + o + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling` s,
+    /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
     /// `shift_span` around `shift_time`.
     ///
     /// # In the data
@@ -21,7 +21,7 @@ zero! {
     /// Definition of an offset.
     pub struct PressureSensorOffset in "pressure_sensor_offset." from 1e4 {
         /// What the pressure sensor shows at ambient pressure
-        offset: PASCAL, (-1e5..=1e5);
+        offset: PASCAL, 1e5;
     }
 }
 
@@ -29,34 +29,39 @@ impl Effect for PressureSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "pressure_sensor_offset",
         meaning: "the zero of the pressure sensor is not at ambient pressure",
-        equation: "p_measured <- p_measured + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
+        equation: "p_measured <- p_measured + o + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the pressure, also at rest",
         experiment: "read the sensor with the muscle open to the air",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: Self::FORMS,
+        forms: &[Self::CONSTANT],
         further_forms: Self::FURTHER_FORMS,
         refinements: Self::REFINEMENTS,
     };
 
     fn is_neutral(&self) -> bool {
-        self.offset == 0.0
+        self.course().is_neutral()
     }
 
     fn is_plausible(&self) -> bool {
         self.course().is_plausible()
     }
 
+    fn own_course(&self, time: f64) -> f64 {
+        self.course().at(time)
+    }
+
     fn readings(&self, readings: Readings) -> Readings {
-        Readings { gauge_pressure: readings.gauge_pressure + self.zero(readings.time), ..readings }
+        Readings { gauge_pressure: readings.gauge_pressure + self.course().at(readings.time), ..readings }
     }
 
     fn true_pressure(&self, reading: f64, time: f64) -> f64 {
-        reading - self.zero(time)
+        reading - self.course().at(time)
     }
 
     fn sentence(&self) -> String {
-        format!("The pressure sensor shows {:+.3} bar at ambient pressure{}.", self.offset * 1e-5, self.course().told())
+        let amount = |value: f64| format!("{:+.3} bar", value * 1e-5);
+        format!("The pressure sensor shows {} at ambient pressure{}.", amount(self.offset), self.course().told(amount))
     }
 }

@@ -7,7 +7,9 @@ crate::variables::variables! {
     /// # Model
     /// Play: the pilot w moves only where the command u pushes it, |u − w| ≤ `play`; with `play_spread` d it is the mean of five
     /// plays from 1 − d to 1 + d times as wide, as dry friction at a spring that sets in gradually. Stiction: it rests until
-    /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`. Overlap: the spool opens no port while the
+    /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`; it sticks again at once or, where u is faster than
+    /// `sliding_speed`, once u turns. Behind a play of (S − J)/2, a stiction of J then makes the band S and the slip jump J of
+    /// Choudhury. Overlap: the spool opens no port while the
     /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
     /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
     /// opens the more abruptly. All three may be there, in this order.
@@ -31,6 +33,8 @@ crate::variables::variables! {
         stiction: f64 = 0.0, VOLT, (0.0..=2.0);
         /// How long a jump of a stuck pilot takes
         jump_time: f64 = 0.0, SECOND, (0.0..=0.1);
+        /// Speed of the command above which a pilot that has broken loose slides along until the command turns
+        sliding_speed: f64 = 1e9, VOLT_PER_SECOND, (0.0..=1e9);
         /// Deviation from the target pressure below which no port opens
         pressure_overlap: f64 = 0.0, PASCAL, (0.0..=2e5);
         /// How abruptly a port opens beyond the overlap
@@ -69,7 +73,11 @@ impl Effect for ValveDeadBand {
             &[("valve_dead_band.pressure_overlap", &[5e3])],
             &[("valve_dead_band.pressure_overlap", &[3e3, 8e3, 2e4]), ("valve_dead_band.overlap_steepness", &[10.0])],
         ],
-        further_forms: &[],
+        further_forms: &[&[
+            ("valve_dead_band.stiction", &[0.03, 0.08, 0.15, 0.03, 0.08, 0.15, 0.03, 0.08, 0.15]),
+            ("valve_dead_band.play", &[0.01, 0.01, 0.01, 0.03, 0.03, 0.03, 0.08, 0.08, 0.08]),
+            ("valve_dead_band.sliding_speed", &[1e-3]),
+        ]],
         refinements: &[("valve_dead_band.start", &[0.3]), ("valve_dead_band.jump_time", &[2.5e-4, 5e-4, 1e-3, 2.5e-3])],
     };
 
@@ -78,8 +86,8 @@ impl Effect for ValveDeadBand {
     }
 
     fn slack(&self) -> Slack {
-        let Self { play, play_spread, stiction, jump_time, start, .. } = *self;
-        Slack { play, play_spread, stiction, jump_time, start }
+        let Self { play, play_spread, stiction, jump_time, sliding_speed, start, .. } = *self;
+        Slack { play, play_spread, stiction, jump_time, sliding_speed, start }
     }
 
     fn target_pressure(&self, at: &Point, _own: &[f64], target: f64) -> f64 {
@@ -97,7 +105,8 @@ impl Effect for ValveDeadBand {
             parts.push(format!("its pilot has a play of {:.0} mV", 2e3 * self.play));
         }
         if self.stiction > 0.0 {
-            parts.push(format!("its pilot sticks until the command is off by {:.0} mV", 1e3 * self.stiction));
+            let then = if self.sliding_speed < Self::default().sliding_speed { ", and slides along then" } else { "" };
+            parts.push(format!("its pilot sticks until the command is off by {:.0} mV{then}", 1e3 * self.stiction));
         }
         if self.pressure_overlap > 0.0 {
             parts.push(format!("no port opens for errors below {:.3} bar", 1e-5 * self.pressure_overlap));

@@ -5,8 +5,8 @@ zero! {
     /// A valve whose zero is off.
     ///
     /// # Model
-    /// u ← u + o c(t), c = 1 + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling_share` s,
-    /// `settling_time` τ, `swing_share` a, `swing_period` T, `swing_phase` φ, `shift_share` j; r goes from 0 to 1 within
+    /// u ← u + o + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling` s,
+    /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
     /// `shift_span` around `shift_time`.
     ///
     /// # In the data
@@ -20,7 +20,7 @@ zero! {
     /// Zero errors in data sheets of proportional pressure regulators.
     pub struct ValveOffset in "valve_offset." from 0.1 {
         /// Voltage that acts beyond the command
-        offset: VOLT, (-2.0..=2.0);
+        offset: VOLT, 2.0;
     }
 }
 
@@ -28,28 +28,32 @@ impl Effect for ValveOffset {
     const DESCRIPTION: Description = Description {
         name: "valve_offset",
         meaning: "the zero of the valve is off",
-        equation: "u <- u + o c(t), c = 1 + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
+        equation: "u <- u + o + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the pressure, and of the force with it",
         experiment: "stairs of the command with the pressure recorded by a second sensor",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: Self::FORMS,
+        forms: &[Self::CONSTANT],
         further_forms: Self::FURTHER_FORMS,
         refinements: Self::REFINEMENTS,
     };
     const STATE_SCALES: &'static [f64] = &[1.0];
 
     fn is_neutral(&self) -> bool {
-        self.offset == 0.0
+        self.course().is_neutral()
     }
 
     fn is_plausible(&self) -> bool {
         self.course().is_plausible()
     }
 
+    fn own_course(&self, time: f64) -> f64 {
+        self.course().at(time)
+    }
+
     fn rests(&self) -> bool {
-        self.is_neutral() || self.course().is_constant()
+        self.course().is_constant()
     }
 
     // The state is the time since the start, or since the offset ceased to be constant.
@@ -58,10 +62,11 @@ impl Effect for ValveOffset {
     }
 
     fn command(&self, _at: &Point, own: &[f64], command: f64) -> f64 {
-        command + self.zero(own[0])
+        command + self.course().at(own[0])
     }
 
     fn sentence(&self) -> String {
-        format!("The valve acts as if its command were {:+.3} V off{}.", self.offset, self.course().told())
+        let amount = |value: f64| format!("{:+.3} V", value);
+        format!("The valve acts as if its command were {} off{}.", amount(self.offset), self.course().told(amount))
     }
 }

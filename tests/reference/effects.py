@@ -271,6 +271,24 @@ class LateStiction(Stiction):
     JUMP_TIME = 0.01
 
 
+class Sliding(Plant):
+    """Choudhury's pilot with a band of 0.2 V and a slip jump of 0.12 V, exact on lines: sticks where the command turns or rests."""
+
+    def seen(self, command):
+        short, slides, stuck, result = 0.04, 0, command[0], []
+        for t0, t1, u, s in super().seen(command):
+            loose, sign = t0, np.sign(s)
+            if sign == 0:
+                loose = t1
+            elif sign != slides:
+                loose = np.clip(t0 + (stuck + sign * (short + 0.12) - u) / s, t0, t1)
+            at = lambda t: u + s * (t - t0) - sign * short
+            slides = sign if loose < t1 else 0
+            result += [(t0, loose, stuck, 0.0), (loose, t1, at(loose), s)]
+            stuck = at(t1) if slides else stuck
+        return result
+
+
 class Overlap(Plant):
     """Nothing flows up to an error of 6 kPa, all that is wanted from 9 kPa on, in between the line from one to the other."""
 
@@ -461,6 +479,7 @@ CASES = [
     Case("spread_play", SpreadPlay(), RAMPS),
     Case("stiction", Stiction(), RAMPS),
     Case("late_stiction", LateStiction(), RAMPS),
+    Case("sliding", Sliding(), RAMPS),
     Case("overlap", Overlap(), STAIRS),
     Case("flow_limit", FlowLimit(), STAIRS),
     Case("nozzle", Nozzle(), STAIRS),
