@@ -3,7 +3,7 @@
 use crate::GRAVITY;
 use crate::Result;
 use crate::memory::Memory;
-use crate::model::{Documentation, Feedthrough, Step, System};
+use crate::model::{Clock, Documentation, Feedthrough, Step, System};
 use crate::parameters::Parameters;
 use crate::plant::holding_pressure;
 use crate::variables::Signals;
@@ -346,7 +346,7 @@ impl System for PidFeedForward {
 
     fn outputs(
         parameters: &Parameters,
-        time: f64,
+        clock: Clock,
         inputs: &ControllerInputs,
         state: &ControllerState,
         memory: &Sampler,
@@ -354,7 +354,7 @@ impl System for PidFeedForward {
         let control_error = inputs.setpoint - inputs.measured_contraction;
         match memory.0 {
             None => outputs_now(parameters, inputs, state),
-            Some(held) if held.is_due(parameters.sampling.sample_time, time) => {
+            Some(held) if held.is_due(parameters.sampling.sample_time, clock.time) => {
                 outputs_now(parameters, inputs, &held.state)
             }
             Some(Held { command, feed_forward, .. }) => ControllerOutputs { command, feed_forward, control_error },

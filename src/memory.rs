@@ -271,7 +271,10 @@ impl Pilot {
             if slack.stiction == 0.0 {
                 tell(line);
             } else if line.slope.abs() > slack.sliding_speed {
-                *steep = 0.0;
+                // On a steep line the pilot has come along.
+                if *steep != 0.0 {
+                    (*stuck_at, *steep) = (line.value, 0.0);
+                }
                 slide(stuck_at, slides, threshold, line, &mut tell);
             } else {
                 *slides = 0.0;
@@ -349,7 +352,8 @@ fn follow_with_stiction(position: &mut f64, steep: &mut f64, threshold: f64, lin
 /// Stiction of a pilot that, once it is loose, goes with the line for as long as that keeps its direction.
 fn slide(position: &mut f64, slides: &mut f64, threshold: f64, line: Line, mut tell: impl FnMut(Line)) {
     let direction = line.slope.signum();
-    let rest = if *slides == direction { 0.0 } else { rest_until_off(*position, threshold, &line).max(0.0) };
+    let is_loose = *slides == direction || (line.value - *position).abs() >= threshold;
+    let rest = if is_loose { 0.0 } else { rest_until_off(*position, threshold, &line) };
     if rest > 0.0 {
         *slides = 0.0;
         tell(Line { span: line.span.min(rest), value: *position, slope: 0.0, ..line });

@@ -206,10 +206,10 @@ pub trait System: Copy + Send + 'static {
     fn initial_state(parameters: &Parameters, inputs: &Self::Inputs) -> Result<Self::State>;
     /// Derivatives of the state, per second.
     fn rates(parameters: &Parameters, inputs: &Self::Inputs, state: &Self::State, rates: &mut Self::State);
-    /// Outputs at a time in s.
+    /// Outputs at an instant.
     fn outputs(
         parameters: &Parameters,
-        time: f64,
+        clock: Clock,
         inputs: &Self::Inputs,
         state: &Self::State,
         memory: &Self::Memory,
@@ -246,6 +246,15 @@ pub trait System: Copy + Send + 'static {
     fn witness(_memory: &mut Self::Memory, _parameters: &Parameters, _times: [f64; 2], _states: [&Self::State; 2]) {}
     /// Forgets what does not matter from a time in s on.
     fn forget(_memory: &mut Self::Memory, _parameters: &Parameters, _time: f64) {}
+}
+
+/// An instant of a simulation, which need not have started at zero.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Clock {
+    /// Now, s.
+    pub time: f64,
+    /// At the start, s.
+    pub start: f64,
 }
 
 /// A communication step.
@@ -351,7 +360,7 @@ pub struct Simulator<S: System> {
     pub slopes: S::Inputs,
     /// See [`integrator::advance`].
     pub tolerance: f64,
-    time: f64,
+    clock: Clock,
     state: S::State,
     step: f64,
     memory: S::Memory,
@@ -366,12 +375,12 @@ impl<S: System> Simulator<S> {
         let (inputs, slopes) = (S::Inputs::default(), S::Inputs::default());
         let memory = S::Memory::default();
         let (tolerance, state) = (integrator::TOLERANCE, S::State::ZERO);
-        Self { parameters, inputs, slopes, tolerance, time: 0.0, state, step: FIRST_STEP, memory }
+        Self { parameters, inputs, slopes, tolerance, clock: Clock::default(), state, step: FIRST_STEP, memory }
     }
 
     /// Time in s.
     pub fn time(&self) -> f64 {
-        self.time
+        self.clock.time
     }
 
     /// State, in the order of [`System::STATE_NAMES`].
@@ -389,7 +398,7 @@ impl<S: System> Simulator<S> {
             return Err(Error::Diverged { time, variable });
         }
         self.state = state;
-        self.time = time;
+        self.clock = Clock { time, start: time };
         self.step = FIRST_STEP;
         let mut memory = S::Memory::default();
         S::expect(&mut memory, &self.coming(0.0));
@@ -399,12 +408,12 @@ impl<S: System> Simulator<S> {
 
     /// Outputs at the present time.
     pub fn outputs(&self) -> S::Outputs {
-        S::outputs(&self.parameters, self.time, &self.inputs, &self.state, &self.memory)
+        S::outputs(&self.parameters, self.clock, &self.inputs, &self.state, &self.memory)
     }
 
     /// The step that is to come.
     fn coming(&self, duration: f64) -> Step<'_, S> {
-        let Self { ref parameters, inputs, slopes, time, state, .. } = *self;
+        let Self { ref parameters, inputs, slopes, clock: Clock { time, .. }, state, .. } = *self;
         Step { parameters, time, state, inputs, slopes, duration }
     }
 
@@ -413,7 +422,7 @@ impl<S: System> Simulator<S> {
     /// # Errors
     /// [`Error::Diverged`], [`Error::TooManySteps`]; nothing has changed then.
     pub fn advance(&mut self, duration: f64) -> Result<()> {
-        let mark = self.memory.mark(self.time);
+        let mark = self.memory.mark(self.clock.time);
         let (state, step) = match self.integrate(duration) {
             Ok(arrived) => arrived,
             Err(error) => {
@@ -424,14 +433,23 @@ impl<S: System> Simulator<S> {
         self.inputs = self.inputs.along(&self.slopes, duration);
         self.slopes = S::Inputs::default();
         (self.state, self.step) = (state, step);
-        self.time += duration;
-        S::forget(&mut self.memory, &self.parameters, self.time);
+        self.clock.time += duration;
+        S::forget(&mut self.memory, &self.parameters, self.clock.time);
         Ok(())
     }
 
     /// State and proposed step after a duration in s. Of the simulator only its memory goes along.
     fn integrate(&mut self, duration: f64) -> Result<(S::State, f64)> {
-        let Self { ref parameters, inputs, slopes, tolerance, time, mut state, mut step, ref mut memory } = *self;
+        let Self {
+            ref parameters,
+            inputs,
+            slopes,
+            tolerance,
+            clock: Clock { time, .. },
+            mut state,
+            mut step,
+            ref mut memory,
+        } = *self;
         let coming = Step { parameters, time, state, inputs, slopes, duration };
         let extent = S::extent(parameters);
         S::expect(memory, &coming);
@@ -480,7 +498,8 @@ impl<S: System> Simulator<S> {
         for (value, rate) in state.as_mut_slice().iter_mut().zip(rates.as_slice()) {
             *value += rate * span;
         }
-        S::outputs(&self.parameters, self.time + span, &self.inputs.along(&self.slopes, span), &state, &self.memory)
+        let clock = Clock { time: self.clock.time + span, ..self.clock };
+        S::outputs(&self.parameters, clock, &self.inputs.along(&self.slopes, span), &state, &self.memory)
     }
 }
 
@@ -557,7 +576,7 @@ impl<S: Registered> Model for Simulator<S> {
     }
 
     fn time(&self) -> f64 {
-        self.time
+        self.time()
     }
 
     fn reset(&mut self, parameters: &Parameters) {
@@ -565,10 +584,10 @@ impl<S: Registered> Model for Simulator<S> {
     }
 
     fn set_time(&mut self, time: f64) {
-        if time != self.time {
-            self.memory.shift(time - self.time);
+        if time != self.clock.time {
+            self.memory.shift(time - self.clock.time);
         }
-        self.time = time;
+        self.clock.time = time;
     }
 
     fn copy_outputs(&self, values: &mut [f64]) {
@@ -614,7 +633,7 @@ impl<S: Registered> Model for Simulator<S> {
             return 0.0;
         }
         let output = position - S::interface().inputs;
-        if let Some(rates) = S::output_rates(&self.parameters, self.time) {
+        if let Some(rates) = S::output_rates(&self.parameters, self.clock.time) {
             return rates.get(output);
         }
         let span = 1e-5;
@@ -627,7 +646,7 @@ impl<S: Registered> Model for Simulator<S> {
         let value_at = |known_value: f64| {
             let mut other = self.clone();
             other.set(known, known_value);
-            if at_start && other.initialize(self.time).is_err() {
+            if at_start && other.initialize(self.clock.time).is_err() {
                 return f64::NAN;
             }
             other.get(output)
@@ -636,7 +655,7 @@ impl<S: Registered> Model for Simulator<S> {
     }
 
     fn save(&self) -> Vec<f64> {
-        let mut saved = vec![self.time, self.step];
+        let mut saved = vec![self.clock.time, self.clock.start, self.step];
         saved.extend_from_slice(self.state.as_slice());
         for signals in [&self.inputs, &self.slopes] {
             signals.visit(&mut |_, value| saved.push(value));
@@ -655,13 +674,14 @@ impl<S: Registered> Model for Simulator<S> {
         restored.memory.save(&mut memory_of_none);
         let fixed = restored.save().len() - memory_of_none.len();
         let (saved, memory) = saved.split_at_checked(fixed).ok_or_else(foreign)?;
-        if saved.iter().chain(memory).any(|value| !value.is_finite()) || saved[1] <= 0.0 {
+        if saved.iter().chain(memory).any(|value| !value.is_finite()) || saved[2] <= 0.0 {
             return Err(wrong("it holds values that no simulation has"));
         }
         restored.memory = S::Memory::load(memory).ok_or_else(foreign)?;
         let mut rest = saved.iter().copied();
         let mut take = || rest.next().unwrap_or_default();
-        (restored.time, restored.step) = (take(), take());
+        restored.clock = Clock { time: take(), start: take() };
+        restored.step = take();
         restored.state.as_mut_slice().iter_mut().for_each(|value| *value = take());
         for signals in [&mut restored.inputs, &mut restored.slopes] {
             signals.visit_mut(&mut |_, _| take());

@@ -2,7 +2,7 @@
 
 use crate::effects::{Effects, Point, Readings};
 use crate::memory::{Line, PlantMemory};
-use crate::model::{Documentation, Extended, Extent, Feedthrough, Passage, Step, System};
+use crate::model::{Clock, Documentation, Extended, Extent, Feedthrough, Passage, Step, System};
 use crate::muscle::{bisect, force_equations};
 use crate::parameters::Parameters;
 use crate::variables::Signals;
@@ -328,14 +328,14 @@ impl System for PneumaticMuscle {
 
     fn outputs(
         parameters: &Parameters,
-        time: f64,
+        clock: Clock,
         _: &MuscleInputs,
         state: &Self::State,
         memory: &PlantMemory,
     ) -> MuscleOutputs {
         let (at, own) = hanging_point(state);
         let force = muscle_force(parameters, &at, own);
-        let shown = readings(parameters, time, &at, force, memory);
+        let shown = readings(parameters, clock, &at, force, memory);
         let contraction = at.contraction + parameters.effects.stretch(force);
         MuscleOutputs {
             contraction,
@@ -400,11 +400,12 @@ fn hanging_point(state: &Extended<3, HANGING_STATES>) -> (Point, &[f64]) {
 
 /// What the sensors show.
 #[inline]
-fn readings(parameters: &Parameters, time: f64, at: &Point, force: f64, memory: &PlantMemory) -> Readings {
+fn readings(parameters: &Parameters, clock: Clock, at: &Point, force: f64, memory: &PlantMemory) -> Readings {
     let effects = &parameters.effects;
+    let Clock { time, start } = clock;
     let remembered = memory.mean_contraction(time - effects.contraction_reach(), time - effects.contraction_delay());
     let contraction = remembered.unwrap_or(at.contraction);
-    effects.readings(Readings { time, contraction, gauge_pressure: at.gauge_pressure, force })
+    effects.readings(Readings { time: time - start, contraction, gauge_pressure: at.gauge_pressure, force })
 }
 
 /// Whether the memory is empty and stays so. An effect that has become neutral is forgotten.
@@ -513,13 +514,13 @@ impl System for PneumaticActuator {
 
     fn outputs(
         parameters: &Parameters,
-        time: f64,
+        clock: Clock,
         inputs: &ActuatorInputs,
         state: &Self::State,
         memory: &PlantMemory,
     ) -> ActuatorOutputs {
         let (at, own) = driven_point(inputs, state);
-        driven_outputs(parameters, time, &at, own, memory)
+        driven_outputs(parameters, clock, &at, own, memory)
     }
 
     fn left_range(_: &Parameters, _: &Self::State) -> Option<&'static str> {
@@ -609,12 +610,12 @@ impl System for MuscleAlone {
 
     fn outputs(
         parameters: &Parameters,
-        time: f64,
+        clock: Clock,
         inputs: &MeasuredInputs,
         state: &Self::State,
         (): &(),
     ) -> ActuatorOutputs {
-        driven_outputs(parameters, time, &measured_point(inputs), &state.0, &PlantMemory::default())
+        driven_outputs(parameters, clock, &measured_point(inputs), &state.0, &PlantMemory::default())
     }
 
     fn left_range(_: &Parameters, _: &Self::State) -> Option<&'static str> {
@@ -639,13 +640,13 @@ fn measured_point(inputs: &MeasuredInputs) -> Point {
 #[inline]
 fn driven_outputs(
     parameters: &Parameters,
-    time: f64,
+    clock: Clock,
     at: &Point,
     own: &[f64],
     memory: &PlantMemory,
 ) -> ActuatorOutputs {
     let force = muscle_force(parameters, at, own);
-    let shown = readings(parameters, time, at, force, memory);
+    let shown = readings(parameters, clock, at, force, memory);
     ActuatorOutputs {
         force,
         gauge_pressure: at.gauge_pressure,

@@ -1,7 +1,7 @@
 //! The reference trajectory of the contraction.
 
 use crate::Result;
-use crate::model::{Documentation, System};
+use crate::model::{Clock, Documentation, System};
 use crate::parameters::Parameters;
 
 crate::variables::variables! {
@@ -111,8 +111,8 @@ impl System for ReferenceTrajectory {
         Ok([])
     }
     fn rates(_: &Parameters, _: &NoInputs, _: &[f64; 0], _: &mut [f64; 0]) {}
-    fn outputs(parameters: &Parameters, time: f64, _: &NoInputs, _: &[f64; 0], (): &()) -> Setpoint {
-        parameters.reference.at(time)
+    fn outputs(parameters: &Parameters, clock: Clock, _: &NoInputs, _: &[f64; 0], (): &()) -> Setpoint {
+        parameters.reference.at(clock.time)
     }
     fn output_rates(parameters: &Parameters, time: f64) -> Option<Setpoint> {
         let Setpoint { setpoint_velocity, setpoint_acceleration, .. } = parameters.reference.at(time);

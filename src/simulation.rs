@@ -151,7 +151,8 @@ impl<'a> Motion<'a> {
             readings = ahead(time, &readings, late);
         }
         undo_rest_in_means(&since, &mut readings, first, averaging);
-        let shown: Vec<f64> = since.iter().map(|since| since + late).collect();
+        let end = since[since.len() - 1];
+        let shown: Vec<f64> = since.iter().map(|since| (since + late).min(end)).collect();
         let unstretched = |(reading, time): (&f64, &f64)| parameters.effects.true_contraction(*reading, 0.0, *time);
         let unstretched: Vec<f64> = readings.iter().zip(&shown).map(unstretched).collect();
         Self { parameters, velocity: slopes(time, &unstretched), readings, shown }

@@ -5,9 +5,13 @@ use std::fmt::Write;
 
 /// Period in s of the fastest swing that is still a zero's, and not a signal.
 pub(crate) const FASTEST: f64 = 8.0;
+/// Period in s of the slowest swing.
+pub(crate) const SLOWEST: f64 = 1000.0;
 
 /// How a zero goes on over time, in the unit of the offset.
 pub struct Course {
+    /// The most that any of its parts can be.
+    pub most: f64,
     /// Where it stays when nothing else is at work.
     pub offset: f64,
     /// Excess at the start, and time constant in s of its settling.
@@ -48,26 +52,28 @@ impl Course {
         self.offset == 0.0 && self.is_constant()
     }
 
-    /// Whether it is as slow as zeros are.
+    /// Whether its parts are such as zeros have: inside their bounds, and slow.
     pub fn is_plausible(&self) -> bool {
         let (swing, period, _) = self.swing;
-        swing == 0.0 || period > FASTEST
+        let are_inside = [self.settling.0, swing, self.shift.0].iter().all(|part| part.abs() < self.most);
+        are_inside && (swing == 0.0 || (period > FASTEST && period < SLOWEST))
     }
 
-    /// What follows a sentence about the offset, whose amounts are told with their unit; nothing where it is constant.
+    /// What follows a sentence about the offset, whose amounts are told with their unit; nothing of what is too small to be told.
     pub fn told(&self, amount: impl Fn(f64) -> String) -> String {
         let (settling, constant) = self.settling;
         let (swing, period, _) = self.swing;
         let (shift, middle, _) = self.shift;
         let mut told = String::new();
-        if settling != 0.0 {
+        let shows = |value: f64| amount(value).contains(|digit: char| ('1'..='9').contains(&digit));
+        if shows(settling) {
             let _ = write!(told, ", {} on top at the start, which settles within {constant:.1} s", amount(settling));
         }
-        if swing != 0.0 {
+        if shows(swing) {
             let either_way = amount(swing).replace('+', "±");
             let _ = write!(told, ", swinging by {either_way} with a period of {period:.0} s");
         }
-        if shift != 0.0 {
+        if shows(shift) {
             let _ = write!(told, ", shifted by {} from {middle:.1} s on", amount(shift));
         }
         told
@@ -95,7 +101,7 @@ macro_rules! zero {
                 /// Amplitude by which the offset swings, as an air conditioner makes it
                 swing: f64 = 0.0, $unit, (0.0..=$most);
                 /// Period of the swing
-                swing_period: f64 = 30.0, SECOND, ($crate::zero::FASTEST..=1000.0);
+                swing_period: f64 = 30.0, SECOND, ($crate::zero::FASTEST..=$crate::zero::SLOWEST);
                 /// Phase of the swing at the start, in rad
                 swing_phase: f64 = 0.0, ONE, (-10.0..=10.0);
                 /// By how much the offset shifts once, as after a shock
@@ -128,6 +134,7 @@ macro_rules! zero {
 
             fn course(&self) -> $crate::zero::Course {
                 $crate::zero::Course {
+                    most: $most,
                     offset: self.offset,
                     settling: (self.settling, self.settling_time),
                     swing: (self.swing, self.swing_period, self.swing_phase),

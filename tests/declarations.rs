@@ -82,13 +82,18 @@ fn without(mut parameters: Parameters, effect: &str) -> Parameters {
 
 /// Puts a model into the middle of a simulation.
 fn run(model: &mut dyn Model, parameters: &Parameters, seed: u32) {
+    run_from(model, parameters, seed, 0.0);
+}
+
+/// The same from a time in s on.
+fn run_from(model: &mut dyn Model, parameters: &Parameters, seed: u32, start: f64) {
     model.reset(parameters);
     let inputs = model.interface().inputs;
     for input in 0..inputs {
         let share = f64::from((seed + 37 * u32::try_from(input).unwrap()) % 100) / 100.0;
         model.set(input, model.interface().variables[input].declaration.unit.nominal * (0.3 + share));
     }
-    model.initialize(0.0).unwrap();
+    model.initialize(start).unwrap();
     model.advance(0.05).unwrap();
 }
 
@@ -156,35 +161,73 @@ fn plants() -> impl Iterator<Item = Box<dyn Model>> {
     models().into_iter().filter(|model| model.interface().name.starts_with("Pneumatic"))
 }
 
+/// Everything at work, and a pilot that sticks again at once, or only where the command is slower than some lines.
+fn stuck(sliding_speed: f64) -> Parameters {
+    let mut parameters = everything_at_work();
+    parameters.set("valve_dead_band.play", 0.0).unwrap();
+    parameters.set("valve_dead_band.sliding_speed", sliding_speed).unwrap();
+    parameters
+}
+
+/// Asserts that outputs differ by the errors of the integration only, relative to the largest value of each, since a force may
+/// pass through zero.
+fn assert_close(expected: &[Vec<f64>], found: &[Vec<f64>], which: &str) {
+    let largest = |output: usize| expected.iter().map(|outputs| outputs[output].abs()).fold(1e-2, f64::max);
+    for (expected, found) in expected.iter().zip(found) {
+        for (output, (expected, found)) in expected.iter().zip(found).enumerate() {
+            let close = (expected - found).abs() <= 1e-5 * largest(output);
+            assert!(close, "output {output}, {which}: {expected} {found}");
+        }
+    }
+}
+
 #[test]
 fn results_do_not_depend_on_the_communication_step() {
-    let mut stuck = everything_at_work();
-    stuck.set("valve_dead_band.play", 0.0).unwrap();
-    for parameters in [everything_at_work(), without(everything_at_work(), "valve_dead_band"), stuck] {
+    let without_pilot = without(everything_at_work(), "valve_dead_band");
+    for parameters in [everything_at_work(), without_pilot, stuck(1e9), stuck(10.0)] {
         for mut model in plants() {
             let mut course = |steps| {
                 run(model.as_mut(), &parameters, 50);
                 along_lines(model.as_mut(), steps, 50)
             };
             let coarse = course(1);
-            // Relative to the largest value of an output, since a force may pass through zero.
-            let largest = |output: usize| coarse.iter().map(|outputs| outputs[output].abs()).fold(1e-2, f64::max);
             for steps in [3, 40] {
-                for (coarse, fine) in coarse.iter().zip(course(steps)) {
-                    for (output, (coarse, fine)) in coarse.iter().zip(&fine).enumerate() {
-                        let close = (coarse - fine).abs() <= 1e-5 * largest(output);
-                        assert!(close, "output {output}, {steps} steps: {coarse} {fine}");
-                    }
-                }
+                assert_close(&coarse, &course(steps), &format!("{steps} steps"));
             }
         }
     }
 }
 
 #[test]
-fn a_restored_run_goes_on_to_the_last_bit() {
+fn results_do_not_depend_on_when_a_simulation_starts() {
+    let mut parameters = Parameters::default();
+    for (name, value) in [
+        ("valve_offset.swing", 0.1),
+        ("pressure_sensor_offset.settling", 1e4),
+        ("contraction_sensor_offset.shift", 5e-3),
+        ("contraction_sensor_offset.shift_time", 1.0),
+        ("contraction_sensor_delay.delay", 0.02),
+        ("force_sensor_offset.swing", 20.0),
+    ] {
+        parameters.set(name, value).unwrap();
+    }
     for mut model in plants() {
-        run(model.as_mut(), &everything_at_work(), 50);
+        let mut course = |start: f64| {
+            run_from(model.as_mut(), &parameters, 50, start);
+            along_lines(model.as_mut(), 3, 50)
+        };
+        let (from_zero, late) = (course(0.0), course(64.0));
+        assert_close(&from_zero, &late, "64 s later");
+    }
+}
+
+#[test]
+fn a_restored_run_goes_on_to_the_last_bit() {
+    let each = [everything_at_work(), stuck(1e9)]
+        .into_iter()
+        .flat_map(|parameters| plants().map(move |model| (parameters, model)));
+    for (parameters, mut model) in each {
+        run(model.as_mut(), &parameters, 50);
         along_lines(model.as_mut(), 3, 20);
         let saved = model.save();
         let expected = along_lines(model.as_mut(), 3, 20);
@@ -302,6 +345,7 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
         ("valve_resonance.lead", 0.5),
         ("temperature_drift.time_constant", 5.0),
         ("temperature_drift.work_share", 0.5),
+        ("valve_dead_band.sliding_speed", 0.5),
         ("valve_offset.settling_time", 5.0),
         ("valve_offset.swing_period", 9.0),
         ("contraction_sensor_offset.swing_phase", 0.5),

@@ -569,6 +569,17 @@ impl<'a> Bench<'a> {
         Some((0..free.len()).map(deviation).collect())
     }
 
+    /// Whether some parameter of an effect shows in samples that fits may not see, and in none of the others: one that jumps late.
+    pub fn shows_late(&self, fitted: &Fitted) -> bool {
+        let variables = fitted.hypothesis.variables();
+        let free = bounds(&variables, &fitted.parameters);
+        let at: Vec<f64> = free.iter().map(|f| f.start).collect();
+        let residuals = |values: &[f64]| self.data.residuals(&with_values(&fitted.parameters, &variables, values));
+        let [seen, unseen] = [Scope::Training, Scope::HeldOut].map(|scope| self.data.weights(scope));
+        let columns = derivatives(&residuals, &free, &at, &fitted.residuals);
+        columns.iter().any(|column| cost(column, &seen) == 0.0 && cost(column, &unseen) > 0.0)
+    }
+
     /// Sum over blocks of the squared gradients that each of them contributes, enlarged for how few they are.
     fn gradients(&self, columns: &[Vec<f64>], residuals: &[f64]) -> DMatrix<f64> {
         let blocks = self.data.blocks();

@@ -209,13 +209,15 @@ fn answer(
 ) -> Option<Diagnosis> {
     if chosen.saw_all {
         notes.push(
-            "the fit saw all samples: the first ones do not tell the size of the cause precisely enough".to_owned(),
+            "the fit saw all samples: the first ones do not tell the size of the cause, or not precisely enough"
+                .to_owned(),
         );
     }
     let nominal_residuals = data.residuals(nominal)?;
     let mut left = data.residuals(&chosen.model.parameters)?;
     data.refine_noise(&left);
-    let (parameters, corrections) = bench.intervals(&chosen.model, Scope::Training);
+    let seen = if chosen.saw_all { Scope::All } else { Scope::Training };
+    let (parameters, corrections) = bench.intervals(&chosen.model, seen);
     let nominal_errors = data.held_out_rms(&nominal_residuals);
     let mut extended = chosen.model.parameters;
     let mut extended_errors = data.held_out_rms(&left);

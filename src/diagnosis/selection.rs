@@ -535,7 +535,7 @@ impl<'a, 'b> Search<'a, 'b> {
         if model.hypothesis.is_impossible(&model.parameters) {
             return refused(wrong);
         }
-        let holds_out = self.holds(&model)?;
+        let holds_out = self.holds(&model)? && !self.bench.shows_late(&model);
         if !(holds_out || self.is_as_good_in_training(&told.fitted, &model) && self.holds(&told.fitted)?) {
             return refused(wrong);
         }

@@ -98,7 +98,8 @@ impl Effect for Leakage {
         let at_two_bar = self.rate * self.flow(REFERENCE_PRESSURE);
         let told = match at_two_bar {
             large if large >= 1e3 => format!("{:.2} bar", large * 1e-5),
-            small => format!("{:.2} mbar", small * 1e-2),
+            small if small >= 10.0 => format!("{:.1} mbar", small * 1e-2),
+            tiny => format!("{tiny:.2} Pa"),
         };
         format!("The muscle leaks: at 2 bar it loses {told} per second.")
     }

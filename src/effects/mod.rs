@@ -102,7 +102,8 @@ pub struct Description {
     pub holds: Holds,
     /// Common forms of the effect, each the parameters that a fit frees, its size first; the best form stands for the cause.
     pub forms: &'static [&'static [Freed]],
-    /// Forms that are rarer, and looked at only where one of the common ones leads and leaves something.
+    /// Forms that are rarer, and looked at only where one of the common ones leads and leaves something; not refined, and no
+    /// cause where what they do over time goes with the command.
     pub further_forms: &'static [&'static [Freed]],
     /// Parameters that are freed as well once the effect leads, and stay free only where the data pay for them.
     pub refinements: &'static [Freed],

@@ -20,7 +20,8 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// Exact for a command of straight lines, but for steps: where a sticking pilot would rest for less than 20 ms between its
-    /// jumps it moves along with the command, and stays where that slows down within 25 ms, so that a step is one jump.
+    /// jumps it moves along with the command, and stays where that slows down within 25 ms, so that a step is one jump. A command
+    /// that is held between communication points rests there: a pilot slides only where its derivative is given.
     ///
     /// # Reference
     /// M. Choudhury, N. Thornhill, S. Shah (2005), Modelling valve stiction, doi 10.1016/j.conengprac.2004.05.005.
@@ -58,7 +59,7 @@ impl Effect for ValveDeadBand {
     const DESCRIPTION: Description = Description {
         name: "valve_dead_band",
         meaning: "small changes of the command do nothing: play or stiction of the pilot",
-        equation: "|u - w| <= play;  w <- u where |u - w| >= stiction;  dp/dt = 0 where |K w - p| < overlap",
+        equation: "|u - w| <= play;  w <- u where |u - w| >= stiction, and then for as long as u keeps its direction;  dp/dt = 0 where |K w - p| < overlap",
         signature: "pressure residual of constant size that follows the direction of the command, or steps",
         experiment: "slow stairs and ramps of the command, up and down, with the muscle locked",
         reference: "Choudhury et al. 2005",
@@ -105,8 +106,10 @@ impl Effect for ValveDeadBand {
             parts.push(format!("its pilot has a play of {:.0} mV", 2e3 * self.play));
         }
         if self.stiction > 0.0 {
-            let then = if self.sliding_speed < Self::default().sliding_speed { ", and slides along then" } else { "" };
-            parts.push(format!("its pilot sticks until the command is off by {:.0} mV{then}", 1e3 * self.stiction));
+            let off = if self.play > 0.0 { "beyond it by" } else { "off by" };
+            let slides = self.sliding_speed < Self::default().sliding_speed;
+            let then = if slides { " and slides until it turns" } else { "" };
+            parts.push(format!("its pilot sticks until the command is {off} {:.0} mV{then}", 1e3 * self.stiction));
         }
         if self.pressure_overlap > 0.0 {
             parts.push(format!("no port opens for errors below {:.3} bar", 1e-5 * self.pressure_overlap));

@@ -14,7 +14,8 @@ zero! {
     /// force stays.
     ///
     /// # Validity
-    /// Constant, settling, swinging or shifted once, as the zeros of sensors; in every recording alike, from its start.
+    /// Constant, settling, swinging or shifted once, as the zeros of sensors; in every recording alike, from its start. Where it
+    /// is constant at first and changed in the course of a simulation, t counts from that change.
     ///
     /// # Reference
     /// Zero errors in data sheets of proportional pressure regulators.
@@ -56,7 +57,7 @@ impl Effect for ValveOffset {
         self.course().is_constant()
     }
 
-    // The state is the time since the start, or since the offset ceased to be constant.
+    // The state is that time.
     fn rates(&self, _at: &Point, _own: &[f64], rates: &mut [f64]) {
         rates[0] = 1.0;
     }

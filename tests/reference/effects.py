@@ -479,7 +479,7 @@ CASES = [
     Case("spread_play", SpreadPlay(), RAMPS),
     Case("stiction", Stiction(), RAMPS),
     Case("late_stiction", LateStiction(), RAMPS),
-    Case("sliding", Sliding(), RAMPS),
+    Case("sliding", Sliding(), ramps([(0, 1.0), (0.3, 1.0), (1.2, 1.7), (1.6, 1.7), (2.2, 2.1), (2.8, 1.4), (4, 1.7), (5, 1.7)])),
     Case("overlap", Overlap(), STAIRS),
     Case("flow_limit", FlowLimit(), STAIRS),
     Case("nozzle", Nozzle(), STAIRS),
