@@ -4,6 +4,7 @@ use super::noise::{self, Noise};
 use crate::integrator;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
+use crate::quality::correlation;
 use crate::simulation::{OUTPUTS, replay, replay_within};
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -21,6 +22,8 @@ const LONGEST_CORRELATION: f64 = 3.0;
 const STRUCTURE_SHARE: f64 = 0.02;
 /// Length of a block in s: errors of different blocks count as independent.
 const BLOCK: f64 = 2.0;
+/// A course with more of its variance than this in common with what drives the muscle may come from there.
+const MOST_OF_VARIANCE: f64 = 0.5;
 /// No sensor is better than this share of what it shows: data without any noise are simulated.
 const FINEST: f64 = 1e-5;
 
@@ -271,9 +274,8 @@ impl<'a> Data<'a> {
             let Some(input) = recording.get(Signal::Command).or_else(|| recording.get(Signal::GaugePressure)) else {
                 return false;
             };
-            let present = recording.time.iter().zip(input).filter(|(_, input)| input.is_finite());
-            let pairs: Vec<_> = present.map(|(time, input)| (course(time - recording.time[0]), *input)).collect();
-            common_variance(&pairs) > 0.5
+            let course: Vec<f64> = recording.time.iter().map(|time| course(time - recording.time[0])).collect();
+            correlation(&course, input).powi(2) > MOST_OF_VARIANCE
         })
     }
 
@@ -372,15 +374,6 @@ fn last_part(recordings: &[Recording]) -> Vec<f64> {
     recordings.iter().map(|recording| from(&recording.time)).collect()
 }
 
-/// Share of the variance of one value that a straight line over the other explains; 0 where one is constant.
-fn common_variance(pairs: &[(f64, f64)]) -> f64 {
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / pairs.len() as f64;
-    let (mean_x, mean_y) = (mean(&|p| p.0), mean(&|p| p.1));
-    let (xx, yy) = (mean(&|p| (p.0 - mean_x).powi(2)), mean(&|p| (p.1 - mean_y).powi(2)));
-    let xy = mean(&|p| (p.0 - mean_x) * (p.1 - mean_y));
-    if xx * yy > 0.0 { xy * xy / (xx * yy) } else { 0.0 }
-}
-
 fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
 }
@@ -409,17 +402,6 @@ fn effective_samples(series: &[f64], period: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn common_variance_is_that_of_a_straight_line() {
-        let line: Vec<_> = (0..1000).map(|k| (f64::from(k % 7), 3.0 - 2.0 * f64::from(k % 7))).collect();
-        assert!((common_variance(&line) - 1.0).abs() < 1e-12);
-        // Unrelated halves: of 4 + 1 parts of variance the line explains 4.
-        let noisy: Vec<_> =
-            (0..1000).map(|k| (f64::from(k % 2), f64::from(k % 2) * 4.0 + f64::from(k / 2 % 2) * 2.0)).collect();
-        assert!((common_variance(&noisy) - 0.8).abs() < 1e-12);
-        assert_eq!(common_variance(&[(1.0, 2.0), (1.0, 3.0)]), 0.0);
-    }
 
     #[test]
     fn neighbours_that_hang_together_are_worth_less() {

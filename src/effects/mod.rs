@@ -342,19 +342,15 @@ macro_rules! effects {
                 let _ = (rest, rest_rates);
             }
 
-            /// How the pilot of the valve fails to follow its command.
+            /// How the pilot of the valve fails to follow its command: as the first effect says that has it fail.
             pub fn slack(&self) -> Slack {
-                let mut all = Slack::default();
                 $(
                     let slack = self.$field.slack();
-                    all.play += slack.play;
-                    all.play_spread += slack.play_spread;
-                    all.stiction += slack.stiction;
-                    all.jump_time += slack.jump_time;
-                    all.sliding_speed += slack.sliding_speed;
-                    all.start += slack.start;
+                    if !slack.is_none() {
+                        return slack;
+                    }
                 )*
-                all
+                Slack::default()
             }
 
             /// Times in s by which the valve sees its command late, one that rises and one that falls.

@@ -85,7 +85,7 @@ fn middle_span(values: &[f64]) -> f64 {
 }
 
 /// Correlation of two signals over the samples that both have; 0 where one of them rests.
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let pairs: Vec<(f64, f64)> =
         a.iter().copied().zip(b.iter().copied()).filter(|(a, b)| a.is_finite() && b.is_finite()).collect();
     let mean = |pick: fn(&(f64, f64)) -> f64| pairs.iter().map(pick).sum::<f64>() / pairs.len() as f64;
@@ -108,4 +108,23 @@ fn asked_pressure(recording: &Recording, parameters: &Parameters) -> Option<Vec<
     // `max` would turn a missing sample into zero.
     let asked = |u: &f64| if u.is_nan() { *u } else { parameters.valve.target_pressure(*u) };
     Some(command.iter().map(asked).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn correlation_is_that_of_a_straight_line() {
+        let a: Vec<f64> = (0..1000).map(|k| f64::from(k % 7)).collect();
+        let falling: Vec<f64> = a.iter().map(|a| 3.0 - 2.0 * a).collect();
+        assert!((correlation(&a, &falling) + 1.0).abs() < 1e-12);
+        // Unrelated halves: of 4 + 1 parts of variance the line explains 4. A missing sample does not count.
+        let half: Vec<f64> = (0..1000).map(|k| f64::from(k % 2)).collect();
+        let mut noisy: Vec<f64> = (0..1000).map(|k| f64::from(k % 2) * 4.0 + f64::from(k / 2 % 2) * 2.0).collect();
+        assert!((correlation(&half, &noisy).powi(2) - 0.8).abs() < 1e-12);
+        noisy.splice(0..4, [f64::NAN; 4]);
+        assert!((correlation(&half, &noisy).powi(2) - 0.8).abs() < 1e-12);
+        assert_eq!(correlation(&[1.0, 1.0], &[2.0, 3.0]), 0.0);
+    }
 }
