@@ -18,6 +18,13 @@ const LONGEST_STEP: f64 = 0.025;
 /// Jumps that follow each other faster than this, in s, are told as the line that they follow.
 const FASTEST_JUMPS: f64 = 1e-3;
 
+/// Most cubics that what a filter shows during one step is made of.
+const MOST_PARTS: f64 = 1000.0;
+
+/// Nodes and weights of Gauss's rule of three points on an interval of length 1.
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+
 /// Plays of different widths that share a pilot.
 const PLAYS: usize = 5;
 
@@ -147,6 +154,29 @@ impl History {
         let mean = (x1 - x0) / span;
         let coefficients = [x0, v0, (3.0 * mean - 2.0 * v0 - v1) / span, (v0 + v1 - 2.0 * mean) / (span * span)];
         self.push(Piece { start, coefficients });
+    }
+
+    /// Adds what a filter of first order with a time constant τ in s makes of such a cubic: in parts that are short beside it,
+    /// y(h) = x(h) + (y(0) − x(0)) exp(−h/τ) − ∫ exp((s − h)/τ) dx/ds ds by Gauss's rule, and cubics between.
+    pub fn push_filtered(&mut self, [start, end]: [f64; 2], values: [f64; 2], rates: [f64; 2], constant: f64) {
+        let mut input = Self::default();
+        input.push_cubic([start, end], values, rates);
+        let Some(input) = input.pieces.pop_back() else { return };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let parts = ((end - start) / (0.25 * constant)).ceil().clamp(1.0, MOST_PARTS) as u32;
+        let span = (end - start) / f64::from(parts);
+        let mut shown = self.look_up(start).0;
+        for part in 0..parts {
+            let from = f64::from(part) * span;
+            let (before, after) = (input.at(from), input.at(from + span));
+            let remembered = |share: f64| (-share * span / constant).exp();
+            let gauss =
+                GAUSS.map(|(share, weight)| weight * remembered(1.0 - share) * input.slope(from + share * span));
+            let next = after + (shown - before) * remembered(1.0) - span * gauss.iter().sum::<f64>();
+            let ends = [start + from, if part + 1 == parts { end } else { start + from + span }];
+            self.push_cubic(ends, [shown, next], [(before - shown) / constant, (after - next) / constant]);
+            shown = next;
+        }
     }
 
     fn push(&mut self, piece: Piece) {

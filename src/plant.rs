@@ -377,9 +377,12 @@ impl System for PneumaticMuscle {
         felt(memory, step, after, |inputs| &mut inputs.command)
     }
 
-    fn witness(memory: &mut PlantMemory, _: &Parameters, times: [f64; 2], [before, now]: [&Self::State; 2]) {
-        if !memory.contraction().is_empty() {
-            memory.contraction().push_cubic(times, [before.0[1], now.0[1]], [before.0[2], now.0[2]]);
+    fn witness(memory: &mut PlantMemory, parameters: &Parameters, times: [f64; 2], [before, now]: [&Self::State; 2]) {
+        let (contractions, velocities) = ([before.0[1], now.0[1]], [before.0[2], now.0[2]]);
+        match parameters.effects.contraction_filter() {
+            _ if memory.contraction().is_empty() => {}
+            0.0 => memory.contraction().push_cubic(times, contractions, velocities),
+            constant => memory.contraction().push_filtered(times, contractions, velocities, constant),
         }
     }
 
@@ -427,7 +430,8 @@ fn expect_command<S: System>(memory: &mut PlantMemory, step: &Step<'_, S>, comma
 
 /// Begins to remember the contraction, in m now, where its sensor is late, and ends where it is not.
 fn expect_contraction<S: System>(memory: &mut PlantMemory, step: &Step<'_, S>, contraction: f64) {
-    match step.parameters.effects.contraction_reach() {
+    let effects = &step.parameters.effects;
+    match effects.contraction_reach() + effects.contraction_filter() {
         0.0 => *memory.contraction() = Default::default(),
         _ => memory.contraction().begin(step.time, contraction),
     }
@@ -539,9 +543,15 @@ impl System for PneumaticActuator {
         }
         expect_command(memory, step, |inputs| inputs.command);
         expect_contraction(memory, step, step.inputs.contraction);
-        if !memory.contraction().is_empty() {
-            let (value, slope) = (step.inputs.contraction, step.slopes.contraction);
-            memory.contraction().push_line(&Line { start: step.time, span: step.duration, value, slope });
+        let (start, span) = (step.time, step.duration);
+        let (value, slope) = (step.inputs.contraction, step.slopes.contraction);
+        match step.parameters.effects.contraction_filter() {
+            _ if memory.contraction().is_empty() => {}
+            0.0 => memory.contraction().push_line(&Line { start, span, value, slope }),
+            constant => {
+                let values = [value, value + slope * span];
+                memory.contraction().push_filtered([start, start + span], values, [slope; 2], constant);
+            }
         }
     }
 

@@ -146,11 +146,13 @@ impl<'a> Motion<'a> {
         let since: Vec<f64> = time.iter().map(|now| now - time[0]).collect();
         let averaging = parameters.effects.contraction_averaging();
         let first = readings[0];
-        let late = parameters.effects.contraction_delay() + 0.5 * averaging;
+        let filter = parameters.effects.contraction_filter();
+        let late = parameters.effects.contraction_delay() + 0.5 * averaging + filter;
         if late > 0.0 {
             readings = ahead(time, &readings, late);
         }
         undo_rest_in_means(&since, &mut readings, first, averaging);
+        undo_rest_in_filter(&since, &mut readings, first, filter);
         let end = since[since.len() - 1];
         let shown: Vec<f64> = since.iter().map(|since| (since + late).min(end)).collect();
         let unstretched = |(reading, time): (&f64, &f64)| parameters.effects.true_contraction(*reading, 0.0, *time);
@@ -174,6 +176,13 @@ impl<'a> Motion<'a> {
 fn undo_rest_in_means(since: &[f64], means: &mut [f64], first: f64, averaging: f64) {
     for (mean, after) in means.iter_mut().zip(since).take_while(|(_, after)| **after < 0.5 * averaging) {
         *mean = first + (*mean - first) * 2.0 * averaging * after / (after + 0.5 * averaging).powi(2);
+    }
+}
+
+/// Takes out of the first of what a filter of first order shows the rest at `first` before the start; right for a constant speed.
+fn undo_rest_in_filter(since: &[f64], shown: &mut [f64], first: f64, constant: f64) {
+    for (shown, after) in shown.iter_mut().zip(since).take_while(|(_, after)| **after < 20.0 * constant) {
+        *shown = first + (*shown - first) * after / (after + constant * (-after / constant - 1.0).exp());
     }
 }
 

@@ -77,6 +77,14 @@ fn effects_agree_with_scipy() {
         ("pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5)]),
         ("resonance", &[("valve_resonance.natural_frequency", 25.0), ("valve_resonance.damping_ratio", 0.35)]),
         (
+            "uneven_resonance",
+            &[
+                ("valve_resonance.natural_frequency", 25.0),
+                ("valve_resonance.damping_ratio", 0.35),
+                ("valve_resonance.emptying_excess", 0.5),
+            ],
+        ),
+        (
             "relaxation",
             &[
                 ("creep.relaxing_stiffness_1", 1500.0),
@@ -98,6 +106,15 @@ fn effects_agree_with_scipy() {
             "averaged_position",
             &[("contraction_sensor_delay.delay", 0.03), ("contraction_sensor_delay.averaging", 0.08)],
         ),
+        (
+            "filtered_position",
+            &[
+                ("contraction_sensor_delay.delay", 0.03),
+                ("contraction_sensor_delay.averaging", 0.08),
+                ("contraction_sensor_delay.filter_time", 0.05),
+            ],
+        ),
+        ("filtering_position", &[("contraction_sensor_delay.filter_time", 0.05)]),
         ("dead_time", &[("valve_dead_time.delay", 0.0373)]),
         ("uneven_dead_time", &[("valve_dead_time.delay", 0.0373), ("valve_dead_time.falling_excess", 0.5)]),
         ("play", &[("valve_dead_band.play", 0.11)]),
@@ -135,6 +152,7 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("leakage", &[("leakage.rate", 0.8), ("leakage.choked_share", 0.4), ("leakage.volume_growth", 0.4)]),
+        ("tear", &[("leakage.rate", 0.6), ("leakage.opening_with_contraction", 1.5)]),
         ("lifting_seal", &[("leakage.rate", 0.8), ("leakage.opening_pressure", 0.9e5), ("leakage.volume_growth", 0.4)]),
         (
             "small_tank",
@@ -210,6 +228,14 @@ fn effects_agree_with_scipy() {
             &[
                 ("friction_hysteresis.half_width", 9.0),
                 ("friction_hysteresis.half_width_per_pressure", 8e-5),
+                ("friction_hysteresis.smoothing_velocity", 2e-3),
+            ],
+        ),
+        (
+            "cord_friction",
+            &[
+                ("friction_hysteresis.half_width", 9.0),
+                ("friction_hysteresis.half_width_per_pull", 0.04),
                 ("friction_hysteresis.smoothing_velocity", 2e-3),
             ],
         ),

@@ -440,6 +440,13 @@ impl<'a> Bench<'a> {
         Some(self.fitted(hypothesis, parameters, self.data.residuals(&parameters)?))
     }
 
+    /// A fit with one of its effects at its neutral defaults and all else as it was; `None` where that cannot be simulated.
+    pub fn neutralised(&self, fitted: &Fitted, effect: &Description) -> Option<Fitted> {
+        let parameters = neutralised(&fitted.parameters, effect);
+        let residuals = self.data.residuals(&parameters)?;
+        Some(self.fitted(&fitted.hypothesis.without(effect.name), parameters, residuals))
+    }
+
     fn slopes_at(&self, model: &Parameters, residuals: &[f64]) -> Slopes {
         let (variables, free): (Vec<_>, Vec<_>) = self.corrections.iter().copied().unzip();
         let at: Vec<f64> = variables.iter().map(|variable| declared(model, variable.name).1).collect();

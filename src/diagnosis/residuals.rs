@@ -159,9 +159,11 @@ impl<'a> Data<'a> {
     /// Mean square of the structural error of a sound nominal muscle relative to that of the noise. What comes before the
     /// muscle has none: the declared tolerance is one of the muscle.
     pub fn structure(&self, signal: Signal) -> f64 {
-        if signal == Signal::GaugePressure {
-            return 0.0;
-        }
+        if signal == Signal::GaugePressure { 0.0 } else { self.share_of_span(signal) }
+    }
+
+    /// Mean square of an error that is as large a share of the span of a signal, of whichever; relative to that of the noise.
+    pub fn share_of_span(&self, signal: Signal) -> f64 {
         (STRUCTURE_SHARE * self.tolerance * self.span(signal) / self.noise[&signal].level).powi(2)
     }
 

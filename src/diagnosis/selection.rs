@@ -38,7 +38,8 @@ const LEFT_BY_FORM: f64 = 0.01;
 const ALSO_BY_FORM: f64 = 3.0;
 /// Share of the error that a hypothesis must explain to be refined as a possible rival of the best.
 const MAY_RIVAL: f64 = 0.8;
-/// How many times the structural error of a sound model an error must be to be called unexplained.
+/// How many times the structural error of a sound model, or that share of the span where it has none, an error must be to be
+/// called unexplained.
 const UNEXPLAINED: f64 = 9.75;
 /// How many standard deviations of the noise's variance a sound model may leave: 0.1 % of all estimates are off by more.
 const NOISE_DOUBT: f64 = 3.0;
@@ -77,6 +78,8 @@ pub struct Chosen {
     pub model: Fitted,
     /// Whether that fit saw all samples, since the first ones tell too little.
     pub saw_all: bool,
+    /// The best fit of its effects to all samples.
+    best: Fitted,
     /// Per effect of the model, in its order: effects that could stand in its place.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The hypotheses with these effects in their place.
@@ -155,13 +158,13 @@ impl Chosen {
         !self.model.hypothesis.parts.is_empty()
     }
 
-    /// Whether causes are named, and leave more than a sound model may.
+    /// Whether causes are named, and leave more than a sound model may even where they were fitted to all samples.
     pub fn leaves_something(&self, data: &Data) -> bool {
-        self.names_causes() && is_unsound(&data.losses(&self.model.residuals, Scope::All), data)
+        self.names_causes() && is_unsound(&data.losses(&self.best.residuals, Scope::All), data)
     }
 
-    /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither fit
-    /// saw better beyond doubt.
+    /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither
+    /// fit saw better beyond doubt.
     pub fn adds_to(&self, other: &Self, data: &Data) -> bool {
         let explains = matches!(self.verdict, Verdict::Explained | Verdict::Ambiguous) && !self.saw_all;
         let (causes, fewer) = (&self.model.hypothesis, &other.model.hypothesis.parts);
@@ -311,14 +314,18 @@ impl<'a, 'b> Search<'a, 'b> {
             .map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// A hypothesis refined in all its effects and, where something is left then, in the best form of its last.
+    /// A hypothesis refined in all its effects and, where something is left then, further refined, and in the best form of its
+    /// last.
     fn in_best_form(&self, judged: Judged) -> Judged {
         let refined = self.finished(self.refined(judged.clone()));
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;
         }
+        let partly = refined.fitted.hypothesis.parts.iter().any(|part| matches!(part.refined, Refined::By(_)));
+        let further = partly.then(|| self.finished(self.refined(refined.clone())));
         let other = self.in_other_forms(&judged).map(|other| self.finished(self.refined(other)));
-        other.into_iter().chain([refined.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
+        let all = further.into_iter().chain(other).chain([refined.clone()]);
+        all.max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
     }
 
     /// The hypothesis in the best other form of its last effect: of the starts only the most promising were fitted.
@@ -402,11 +409,12 @@ impl<'a, 'b> Search<'a, 'b> {
         let (mut worth, mut still) = (0.0, 0.0);
         let is_form_alone = self.may_be_form(&fewer.fitted.losses);
         for (signal, left) in left {
-            let least =
-                if is_form_alone { left_by_structure(signal, &self.bench.data) } else { left_by_form(before[&signal]) };
+            let of_structure = left_by_structure(signal, &self.bench.data);
+            let least = if is_form_alone { of_structure } else { left_by_form(before[&signal]) };
             if left > least {
-                worth += left;
-                still += after[&signal];
+                // What a sound model may leave is not there to be explained.
+                worth += (left - of_structure).max(0.0);
+                still += (after[&signal] - of_structure).max(0.0);
             } else {
                 still += (after[&signal] - left).max(0.0);
             }
@@ -416,8 +424,9 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The most promising hypotheses with one effect more than those of a level, the best first.
     ///
-    /// Where the best still leaves something, each of its earlier effects is exchanged for others: alone, a wrong one may
-    /// have looked better.
+    /// Of the best each effect is exchanged for others. Where it still leaves something, these are fitted beside what the other
+    /// effects are without it: alone, a wrong one may have looked better. Where it leaves nothing, beside what they are with it:
+    /// what does the same then may not have been found from elsewhere.
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
         let mut bases = carried_on(level);
         // What forms may leave is looked into only where the best leaves it.
@@ -426,12 +435,21 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         let more = bases.into_iter().flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, starts)).collect();
         let mut next = self.worth_refining(level, more);
-        let Some(best) = next.first().filter(|best| !self.may_be_form(&best.fitted.losses)) else { return next };
-        let earlier = best.fitted.hypothesis.parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
-        let fewer = earlier.iter().filter_map(|part| self.without(best, part));
-        let mut exchanged: Vec<Judged> = fewer.flat_map(|base| self.extend(&base.fitted, false, starts)).collect();
-        exchanged.retain(|judged| !next.iter().any(|known| same_effects(known, judged)));
-        next.extend(self.worth_refining(level, exchanged));
+        let Some(best) = possible(&next).or(next.first()) else { return next };
+        let parts = &best.fitted.hypothesis.parts;
+        let fewer: Vec<Fitted> = if !self.may_be_form(&best.fitted.losses) {
+            let earlier = parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
+            earlier.iter().filter_map(|part| Some(self.without(best, part)?.fitted)).collect()
+        } else if possible(level).is_some_and(|fewer| self.is_worth(fewer, best)) {
+            parts.iter().filter_map(|part| self.bench.neutralised(&best.fitted, part.effect)).collect()
+        } else {
+            Vec::new()
+        };
+        let mut exchanged: Vec<Judged> = fewer.iter().flat_map(|base| self.extend(base, false, starts)).collect();
+        exchanged.retain(|judged| !next.iter().any(|known| same_effects(known, judged) && known.score >= judged.score));
+        let exchanged = self.worth_refining(level, exchanged);
+        next.retain(|known| !exchanged.iter().any(|judged| same_effects(known, judged)));
+        next.extend(exchanged);
         sorted(next)
     }
 
@@ -458,7 +476,7 @@ impl<'a, 'b> Search<'a, 'b> {
     fn is_sound(&self, losses: &[Loss]) -> bool {
         let data = &self.bench.data;
         let doubt = |signal| NOISE_DOUBT * data.noise_doubt(signal);
-        leaves_at_most(losses, |signal| NEGLIGIBLE + doubt(signal) + UNEXPLAINED.powi(2) * data.structure(signal))
+        leaves_at_most(losses, |signal| NEGLIGIBLE + doubt(signal) + UNEXPLAINED.powi(2) * data.share_of_span(signal))
     }
 
     /// The best hypothesis of all levels, each of which must be worth its effects.
@@ -518,6 +536,7 @@ impl<'a, 'b> Search<'a, 'b> {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
             Some(Chosen {
                 verdict,
+                best: self.baseline.clone(),
                 model,
                 saw_all: false,
                 alternatives: Vec::new(),
@@ -552,7 +571,7 @@ impl<'a, 'b> Search<'a, 'b> {
             Verdict::PartlyExplained
         };
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
-        Some(Chosen { verdict, model, saw_all: !holds_out, alternatives, rivals, singles })
+        Some(Chosen { verdict, model, best: best.fitted, saw_all: !holds_out, alternatives, rivals, singles })
     }
 
     /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
@@ -599,15 +618,19 @@ impl<'a, 'b> Search<'a, 'b> {
         if equal.is_empty() { by_form().into_iter().collect() } else { equal }
     }
 
-    /// Whether two hypotheses leave so little that their forms decide between them, and not their causes.
+    /// Whether two hypotheses leave so little that their forms decide between them, and not their causes. A cause in a simpler
+    /// form is as good as long as forms may leave as much; of several causes one would be as small as that.
     fn differ_by_form(&self, best: &Judged, other: &Judged) -> bool {
+        let is_simpler =
+            best.fitted.hypothesis.parts.len() == 1 && other.fitted.hypothesis.size() < best.fitted.hypothesis.size();
         let [before, of_best, of_other] =
             [&self.baseline, &best.fitted, &other.fitted].map(|fitted| beyond_noise(&fitted.losses));
         before.into_iter().all(|(signal, before)| {
             let alike = ALSO_BY_FORM * of_best[&signal];
             // A sound model may have its structural error, too, and then that decides.
             let structure = self.bench.data.structure(signal).min(LEFT_BY_FORM * before);
-            of_other[&signal] <= NEGLIGIBLE.max(structure).max(alike.min(left_by_form(before)))
+            let most = if is_simpler { left_by_form(before) } else { alike.min(left_by_form(before)) };
+            of_other[&signal] <= NEGLIGIBLE.max(structure).max(most)
         })
     }
 }

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Holds, Point};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE};
 
 /// Smallest velocity in m/s over which a friction without a loop changes its sign.
 const LEAST_SMOOTHING: f64 = 2e-4;
@@ -7,9 +7,9 @@ crate::variables::variables! {
     /// Dry friction between threads and rubber: a loss that depends on the way, not on its speed.
     ///
     /// # Model
-    /// F ← F − (w₀ + w₁ p) h (1 + c exp(−(v/v_s)²)), with the loop h = (1 − m) z₁ + m z₂ of two elements that pass it
+    /// F ← F − (w₀ + w₁ p + μ |F|) h (1 + c exp(−(v/v_s)²)), with the loop h = (1 − m) z₁ + m z₂ of two elements that pass it
     /// within the displacements s and r s: s dz/dx = 1 − (γ sgn(v z) + 1 − γ) |z|ⁿ. `half_width` w₀,
-    /// `half_width_per_pressure` w₁, `presliding_displacement` s, `second_share` m, `second_ratio` r, `knee` n,
+    /// `half_width_per_pressure` w₁, `half_width_per_pull` μ, `presliding_displacement` s, `second_share` m, `second_ratio` r, `knee` n,
     /// `unloading` γ, `stribeck_share` c, `stribeck_velocity` v_s. n = γ = 1 is the law of Dahl. Both z start at
     /// `start` and stay within ±1. With a `smoothing_velocity` v₀ it is Coulomb's law without a memory, h = tanh(v/v₀).
     ///
@@ -32,6 +32,8 @@ crate::variables::variables! {
         half_width: f64 = 0.0, NEWTON, (0.0..=300.0);
         /// Growth of the half width with gauge pressure
         half_width_per_pressure: f64 = 0.0, SQUARE_METRE, (0.0..=1e-3);
+        /// Growth of the half width with the pull, as of a cord around a bolt
+        half_width_per_pull: f64 = 0.0, ONE, (0.0..=0.5);
         /// Displacement after a reversal at which most of the loop is passed
         presliding_displacement: f64 = 2e-3, METRE, (1e-5..=0.1);
         /// Share of the second element in the loop
@@ -54,8 +56,9 @@ crate::variables::variables! {
 }
 
 impl FrictionHysteresis {
-    fn width(&self, gauge_pressure: f64) -> f64 {
-        self.half_width + self.half_width_per_pressure * gauge_pressure.max(0.0)
+    fn width(&self, gauge_pressure: f64, pull: f64) -> f64 {
+        let of_pressure = self.half_width + self.half_width_per_pressure * gauge_pressure.max(0.0);
+        of_pressure + self.half_width_per_pull * pull.abs()
     }
 
     /// Rate of an element at `z` while the muscle moves by `velocity` in units of its displacement per second.
@@ -88,7 +91,7 @@ impl Effect for FrictionHysteresis {
     const DESCRIPTION: Description = Description {
         name: "friction_hysteresis",
         meaning: "dry friction in the braid: a loss that does not depend on speed",
-        equation: "F <- F - (w0 + w1 p) h (1 + c exp(-(v/v_s)^2)),  h of two elements s dz/dx = 1 - z sgn(v), or h = tanh(v/v0)",
+        equation: "F <- F - (w0 + w1 p + mu |F|) h (1 + c exp(-(v/v_s)^2)),  h of two elements s dz/dx = 1 - z sgn(v), or h = tanh(v/v0)",
         signature: "force residual changes sign at reversals, width independent of speed",
         experiment: "triangles of shrinking amplitude at three pressures",
         reference: "Dahl 1968; Wen 1976; Andersson et al. 2007; thesis eq. 4.20",
@@ -113,13 +116,14 @@ impl Effect for FrictionHysteresis {
             ("friction_hysteresis.knee", &[1.5]),
             ("friction_hysteresis.unloading", &[0.7]),
             ("friction_hysteresis.stribeck_share", &[0.1]),
+            ("friction_hysteresis.half_width_per_pull", &[0.01]),
             ("friction_hysteresis.start", &[0.3, -0.3]),
         ],
     };
     const STATE_SCALES: &'static [f64] = &[1.0, 1.0];
 
     fn is_neutral(&self) -> bool {
-        self.half_width == 0.0 && self.half_width_per_pressure == 0.0
+        self.half_width == 0.0 && self.half_width_per_pressure == 0.0 && self.half_width_per_pull == 0.0
     }
 
     fn start(&self, _at: &Point, own: &mut [f64]) {
@@ -140,13 +144,14 @@ impl Effect for FrictionHysteresis {
             return force;
         }
         let engaged = self.engaged(at.contraction_velocity, own);
-        force - self.width(at.gauge_pressure) * engaged * self.stribeck(at.contraction_velocity)
+        force - self.width(at.gauge_pressure, force) * engaged * self.stribeck(at.contraction_velocity)
     }
 
     fn sentence(&self) -> String {
-        let at_three_bar = 2.0 * self.width(3e5);
+        let loop_width = 2.0 * self.width(3e5, REFERENCE_FORCE);
+        let pull = if self.half_width_per_pull > 0.0 { format!(" and {REFERENCE_FORCE:.0} N") } else { String::new() };
         format!(
-            "Dry friction in the braid: at 3 bar the muscle pulls {at_three_bar:.0} N less when it shortens than when it lengthens."
+            "Dry friction in the braid: at 3 bar{pull} the muscle pulls {loop_width:.0} N less when it shortens than when it lengthens."
         )
     }
 }

@@ -11,8 +11,9 @@ crate::variables::variables! {
     /// Air that is lost while the valve goes on blowing.
     ///
     /// # Model
-    /// dp/dt ← dp/dt − k ((1 − c) q (q/2 bar)^(e−1) + c (p + p_a) ψ(p)) / (1 + `volume_growth` x/0.1 m), q = max(p − `opening_pressure`, 0):
-    /// `rate` k, `exponent` e, `choked_share` c of the leak that is a hole and not a porous wall or a seal that pressure lifts. ψ = 1 while
+    /// dp/dt ← dp/dt − k ((1 − c) q (q/2 bar)^(e−1) + c (p + p_a) ψ(p)) (1 + o x/0.1 m) / (1 + `volume_growth` x/0.1 m), q = max(p − `opening_pressure`, 0):
+    /// `rate` k, `exponent` e, `choked_share` c of the leak that is a hole and not a porous wall or a seal that pressure lifts,
+    /// `opening_with_contraction` o of a tear that the growing girth opens. ψ = 1 while
     /// the flow is choked, p_a/(p + p_a) < b = 0.3, and √(1 − ((p_a/(p + p_a) − b)/(1 − b))²) above. The pressure cannot fall below
     /// ambient.
     ///
@@ -37,6 +38,8 @@ crate::variables::variables! {
         opening_pressure: f64 = 0.0, PASCAL, (0.0..=1e5);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
+        /// Relative growth of the hole at 0.1 m of contraction
+        opening_with_contraction: f64 = 0.0, ONE, (0.0..=20.0);
     }
 }
 
@@ -77,6 +80,7 @@ impl Effect for Leakage {
         refinements: &[
             ("leakage.choked_share", &[0.5]),
             ("leakage.volume_growth", &[0.3]),
+            ("leakage.opening_with_contraction", &[0.5]),
             ("leakage.exponent", &[1.3]),
             ("leakage.opening_pressure", &[0.3e5]),
         ],
@@ -91,7 +95,12 @@ impl Effect for Leakage {
             return rate;
         }
         let pressure = at.gauge_pressure.max(0.0);
-        rate - self.rate * self.flow(pressure) / (1.0 + self.volume_growth * at.relative_contraction()).max(0.1)
+        let grown = |growth: f64| (1.0 + growth * at.relative_contraction()).max(0.1);
+        let mut leak = self.rate * self.flow(pressure);
+        if self.opening_with_contraction != 0.0 {
+            leak *= grown(self.opening_with_contraction);
+        }
+        rate - leak / grown(self.volume_growth)
     }
 
     fn sentence(&self) -> String {

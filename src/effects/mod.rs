@@ -231,6 +231,10 @@ pub trait Effect: Declared + Default {
     fn contraction_averaging(&self) -> f64 {
         0.0
     }
+    /// Time constant in s of its filter of first order.
+    fn contraction_filter(&self) -> f64 {
+        0.0
+    }
     /// What the sensors show.
     fn readings(&self, readings: Readings) -> Readings {
         readings
@@ -381,6 +385,12 @@ macro_rules! effects {
             #[inline]
             pub fn contraction_averaging(&self) -> f64 {
                 0.0 $(+ self.$field.contraction_averaging())*
+            }
+
+            /// Time constant in s of the filter of first order of the position sensor.
+            #[inline]
+            pub fn contraction_filter(&self) -> f64 {
+                0.0 $(+ self.$field.contraction_filter())*
             }
 
             /// Time in s from which on the past of the contraction is not seen any more.

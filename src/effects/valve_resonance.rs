@@ -5,8 +5,8 @@ crate::variables::variables! {
     ///
     /// # Model
     /// d²q/dt² = ω² e (1 + k tanh(|e|/1 bar)) − 2 ζ ω dq/dt, e = p_target − q, in place of the first-order valve:
-    /// `natural_frequency` ω, `damping_ratio` ζ, `stiffening` k with the size of the error. There is no resonance at
-    /// ω = 0. A regulator with a proportional part acts on the error by the share l of its damping: 2 ζ ω l dp_target/dt more, `lead` l. The pressure is q itself, or follows it as a main stage follows its pilot, τ dp/dt = q − p, `main_stage` τ.
+    /// `natural_frequency` ω, `damping_ratio` ζ, times 1 + `emptying_excess` while q falls, `stiffening` k with the size of the
+    /// error. There is no resonance at ω = 0. A regulator with a proportional part acts on the error by the share l of its damping: 2 ζ ω l dp_target/dt more, `lead` l. The pressure is q itself, or follows it as a main stage follows its pilot, τ dp/dt = q − p, `main_stage` τ.
     ///
     /// # In the data
     /// The pressure rings after a step; its gain exceeds one near ω.
@@ -21,6 +21,8 @@ crate::variables::variables! {
         natural_frequency: f64 = 0.0, RADIAN_PER_SECOND, (0.0..=500.0);
         /// Damping ratio
         damping_ratio: f64 = 0.4, ONE, (0.02..=0.8);
+        /// Relative excess of the damping while emptying
+        emptying_excess: f64 = 0.0, ONE, (-0.9..=5.0);
         /// Relative growth of the stiffness with errors far beyond 1 bar
         stiffening: f64 = 0.0, ONE, (-0.5..=2.0);
         /// Share of the damping that acts on the error and not on the pressure, as the proportional part of a regulator does
@@ -67,7 +69,11 @@ impl Effect for ValveResonance {
             ],
         ],
         further_forms: &[],
-        refinements: &[("valve_resonance.stiffening", &[0.2]), ("valve_resonance.lead", &[0.5])],
+        refinements: &[
+            ("valve_resonance.stiffening", &[0.2]),
+            ("valve_resonance.lead", &[0.5]),
+            ("valve_resonance.emptying_excess", &[0.3]),
+        ],
     };
     // Integrated rate of the pilot, and how far it is ahead of the pressure.
     const STATE_SCALES: &'static [f64] = &[1e6, 1e4];
@@ -82,7 +88,8 @@ impl Effect for ValveResonance {
         if self.stiffening != 0.0 {
             error *= 1.0 + self.stiffening * (error.abs() / LARGE_ERROR).tanh();
         }
-        rates[0] = frequency * (frequency * error - 2.0 * self.damping_ratio * (1.0 - self.lead) * rate);
+        let emptying = if rate < 0.0 { 1.0 + self.emptying_excess } else { 1.0 };
+        rates[0] = frequency * (frequency * error - 2.0 * self.damping_ratio * emptying * (1.0 - self.lead) * rate);
         rates[1] = if self.main_stage < SHORTEST { 0.0 } else { rate - own[1] / self.main_stage };
     }
 

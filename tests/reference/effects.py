@@ -158,6 +158,14 @@ class Regulator(Plant):
         return own[0] + 17.5 * (target - pressure)
 
 
+class UnevenResonance(Resonance):
+    """Damped one and a half times as much while the pressure falls."""
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        damping_ratio = 0.35 if own[0] > 0 else 0.525
+        return [25.0**2 * (target - pressure) - 2 * damping_ratio * 25.0 * own[0]]
+
+
 class SlowerWhenShort(Plant):
     def pressure_rate(self, target, pressure, x, own):
         return (target - pressure) / (1 / VALVE_BANDWIDTH + 0.03 * (1 + 7 * x))
@@ -188,6 +196,36 @@ class AveragedPosition(Plant):
         early = x[0] * SAMPLE_TIME * np.arange(-11, 0)
         integral = np.concatenate([early, own[:, 0]])
         return (integral[8:-3] - integral[:-11]) / (8 * SAMPLE_TIME)
+
+
+class FilteredPosition(AveragedPosition):
+    """The same of what a filter of first order shows; own are its output and the integral of that."""
+
+    own_scales = 0.1, 1.0
+
+    def own_start(self, x):
+        return [x, 0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(x - own[0]) / 0.05, own[0]]
+
+    def readings(self, x, force, own):
+        return super().readings(x, force, own[:, 1:])
+
+
+class FilteringPosition(Plant):
+    """The sensor shows the output of a filter of first order."""
+
+    own_scales = (0.1,)
+
+    def own_start(self, x):
+        return [x]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(x - own[0]) / 0.05]
+
+    def readings(self, x, force, own):
+        return own[:, 0]
 
 
 class UnevenDeadTime(Plant):
@@ -328,6 +366,13 @@ class Leakage(Plant):
         return VALVE_BANDWIDTH * (target - pressure) - leak
 
 
+class Tear(Plant):
+    """A hole that the growing girth opens."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        return VALVE_BANDWIDTH * (target - pressure) - (0.6 + 9 * x) * pressure
+
+
 class LiftingSeal(Plant):
     """Tight up to 0.9 bar."""
 
@@ -452,6 +497,14 @@ class DirectFriction(Plant):
         return super().force(pressure, x, velocity, own) - (9 + 8e-5 * pressure) * np.tanh(velocity / 2e-3)
 
 
+class CordFriction(Plant):
+    """Coulomb's law without a memory; a part goes with the pull, as of a cord around a bolt."""
+
+    def force(self, pressure, x, velocity, own):
+        pull = super().force(pressure, x, velocity, own)
+        return pull - (9 + 0.04 * abs(pull)) * np.tanh(velocity / 2e-3)
+
+
 STAIRS = staircase([0.8, 1.5, 2.0, 1.2], 1.2)
 RAMPS = ramps([(0, 1.0), (0.3, 1.0), (1.5, 2.0), (2.0, 2.0), (2.6, 1.4), (3.0, 1.9), (3.6, 1.2), (4.4, 1.3), (5, 1.3)])
 
@@ -473,7 +526,10 @@ CASES = [
     Case("slower_when_short", SlowerWhenShort(), STAIRS),
     Case("uneven_dead_time", UnevenDeadTime(), RAMPS),
     Case("averaged_position", AveragedPosition(), RAMPS),
+    Case("filtered_position", FilteredPosition(), RAMPS),
+    Case("filtering_position", FilteringPosition(), RAMPS),
     Case("resonance", Resonance(), STAIRS),
+    Case("uneven_resonance", UnevenResonance(), STAIRS),
     Case("dead_time", DeadTime(), RAMPS),
     Case("play", Play(), RAMPS),
     Case("spread_play", SpreadPlay(), RAMPS),
@@ -484,6 +540,7 @@ CASES = [
     Case("flow_limit", FlowLimit(), STAIRS),
     Case("nozzle", Nozzle(), STAIRS),
     Case("leakage", Leakage(), STAIRS),
+    Case("tear", Tear(), STAIRS),
     Case("lifting_seal", LiftingSeal(), STAIRS),
     Case("small_tank", SmallTank(), STAIRS),
     Case("swinging_zero", SwingingZero(), STAIRS),
@@ -496,6 +553,7 @@ CASES = [
     Case("threshold", Threshold(), STAIRS),
     Case("friction", Friction(), RAMPS),
     Case("direct_friction", DirectFriction(), RAMPS),
+    Case("cord_friction", CordFriction(), RAMPS),
 ]
 
 
