@@ -91,6 +91,14 @@ struct Piece {
 impl Piece {
     const NUMBERS: usize = 5;
 
+    /// The cubic between two instants with their values and rates (Hermite); `None` where there is no time between them.
+    fn hermite([start, end]: [f64; 2], [x0, x1]: [f64; 2], [v0, v1]: [f64; 2]) -> Option<Self> {
+        let span = end - start;
+        let mean = (x1 - x0) / span;
+        let coefficients = [x0, v0, (3.0 * mean - 2.0 * v0 - v1) / span, (v0 + v1 - 2.0 * mean) / (span * span)];
+        (span > 0.0).then_some(Self { start, coefficients })
+    }
+
     fn at(&self, after: f64) -> f64 {
         self.coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * after + coefficient)
     }
@@ -145,34 +153,29 @@ impl History {
         }
     }
 
-    /// Adds the cubic between two instants with their values and rates (Hermite).
-    pub fn push_cubic(&mut self, [start, end]: [f64; 2], [x0, x1]: [f64; 2], [v0, v1]: [f64; 2]) {
-        let span = end - start;
-        if span <= 0.0 {
-            return;
+    /// Adds the cubic between two instants with their values and rates.
+    pub fn push_cubic(&mut self, times: [f64; 2], values: [f64; 2], rates: [f64; 2]) {
+        if let Some(piece) = Piece::hermite(times, values, rates) {
+            self.push(piece);
         }
-        let mean = (x1 - x0) / span;
-        let coefficients = [x0, v0, (3.0 * mean - 2.0 * v0 - v1) / span, (v0 + v1 - 2.0 * mean) / (span * span)];
-        self.push(Piece { start, coefficients });
     }
 
-    /// Adds what a filter of first order with a time constant τ in s makes of such a cubic: in parts that are short beside it,
-    /// y(h) = x(h) + (y(0) − x(0)) exp(−h/τ) − ∫ exp((s − h)/τ) dx/ds ds by Gauss's rule, and cubics between.
+    /// Adds what a filter of first order with a time constant τ in s makes of such a cubic: in parts that are short beside it
+    /// (unless the step is longer than 250 τ), y(h) = x(h) + (y(0) − x(0)) exp(−h/τ) − ∫ exp((s − h)/τ) dx/ds ds by Gauss's rule, and cubics between.
     pub fn push_filtered(&mut self, [start, end]: [f64; 2], values: [f64; 2], rates: [f64; 2], constant: f64) {
-        let mut input = Self::default();
-        input.push_cubic([start, end], values, rates);
-        let Some(input) = input.pieces.pop_back() else { return };
+        let Some(input) = Piece::hermite([start, end], values, rates) else { return };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let parts = ((end - start) / (0.25 * constant)).ceil().clamp(1.0, MOST_PARTS) as u32;
         let span = (end - start) / f64::from(parts);
+        let remembered = |share: f64| (-share * span / constant).exp();
+        let whole = remembered(1.0);
+        let weights = GAUSS.map(|(share, weight)| (share * span, weight * span * remembered(1.0 - share)));
         let mut shown = self.look_up(start).0;
         for part in 0..parts {
             let from = f64::from(part) * span;
             let (before, after) = (input.at(from), input.at(from + span));
-            let remembered = |share: f64| (-share * span / constant).exp();
-            let gauss =
-                GAUSS.map(|(share, weight)| weight * remembered(1.0 - share) * input.slope(from + share * span));
-            let next = after + (shown - before) * remembered(1.0) - span * gauss.iter().sum::<f64>();
+            let forgotten: f64 = weights.iter().map(|(at, weight)| weight * input.slope(from + at)).sum();
+            let next = after + (shown - before) * whole - forgotten;
             let ends = [start + from, if part + 1 == parts { end } else { start + from + span }];
             self.push_cubic(ends, [shown, next], [(before - shown) / constant, (after - next) / constant]);
             shown = next;

@@ -179,7 +179,8 @@ fn undo_rest_in_means(since: &[f64], means: &mut [f64], first: f64, averaging: f
     }
 }
 
-/// Takes out of the first of what a filter of first order shows the rest at `first` before the start; right for a constant speed.
+/// Takes out of the first of what a filter of first order shows the rest at `first` before the start; right for a constant speed
+/// where nothing averages as well.
 fn undo_rest_in_filter(since: &[f64], shown: &mut [f64], first: f64, constant: f64) {
     for (shown, after) in shown.iter_mut().zip(since).take_while(|(_, after)| **after < 20.0 * constant) {
         *shown = first + (*shown - first) * after / (after + constant * (-after / constant - 1.0).exp());

@@ -34,7 +34,7 @@ const NEGLIGIBLE: f64 = 0.25;
 /// Share of a signal's error that a named effect may leave because its form differs from the true one: a tenth of its rms.
 const LEFT_BY_FORM: f64 = 0.01;
 /// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
-/// in the forms, which are never known exactly.
+/// in the forms, which are never known exactly. Beside a single cause one in a simpler form may leave all of that.
 const ALSO_BY_FORM: f64 = 3.0;
 /// Share of the error that a hypothesis must explain to be refined as a possible rival of the best.
 const MAY_RIVAL: f64 = 0.8;
@@ -78,8 +78,8 @@ pub struct Chosen {
     pub model: Fitted,
     /// Whether that fit saw all samples, since the first ones tell too little.
     pub saw_all: bool,
-    /// The best fit of its effects to all samples.
-    best: Fitted,
+    /// What the best fit to all samples leaves.
+    left: Vec<Loss>,
     /// Per effect of the model, in its order: effects that could stand in its place.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The hypotheses with these effects in their place.
@@ -160,7 +160,7 @@ impl Chosen {
 
     /// Whether causes are named, and leave more than a sound model may even where they were fitted to all samples.
     pub fn leaves_something(&self, data: &Data) -> bool {
-        self.names_causes() && is_unsound(&data.losses(&self.best.residuals, Scope::All), data)
+        self.names_causes() && is_unsound(&self.left, data)
     }
 
     /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither
@@ -424,9 +424,9 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The most promising hypotheses with one effect more than those of a level, the best first.
     ///
-    /// Of the best each effect is exchanged for others. Where it still leaves something, these are fitted beside what the other
-    /// effects are without it: alone, a wrong one may have looked better. Where it leaves nothing, beside what they are with it:
-    /// what does the same then may not have been found from elsewhere.
+    /// Of the best, effects are exchanged for others. Where it leaves more than forms may, the earlier ones are, beside what the rest
+    /// is without them: alone, a wrong one may have looked better. Where it does not, and is worth one effect more, all are, beside
+    /// what the rest is with them: what does the same there may not have been found from elsewhere.
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
         let mut bases = carried_on(level);
         // What forms may leave is looked into only where the best leaves it.
@@ -437,20 +437,23 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut next = self.worth_refining(level, more);
         let Some(best) = possible(&next).or(next.first()) else { return next };
         let parts = &best.fitted.hypothesis.parts;
-        let fewer: Vec<Fitted> = if !self.may_be_form(&best.fitted.losses) {
+        let without: Vec<(&Part, Option<Fitted>)> = if !self.may_be_form(&best.fitted.losses) {
             let earlier = parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
-            earlier.iter().filter_map(|part| Some(self.without(best, part)?.fitted)).collect()
+            earlier.iter().map(|part| (part, self.without(best, part).map(|judged| judged.fitted))).collect()
         } else if possible(level).is_some_and(|fewer| self.is_worth(fewer, best)) {
-            parts.iter().filter_map(|part| self.bench.neutralised(&best.fitted, part.effect)).collect()
+            parts.iter().map(|part| (part, self.bench.neutralised(&best.fitted, part.effect))).collect()
         } else {
             Vec::new()
         };
-        let mut exchanged: Vec<Judged> = fewer.iter().flat_map(|base| self.extend(base, false, starts)).collect();
+        let exchange = |(part, base): &(&Part, Option<Fitted>)| {
+            let others: Vec<_> =
+                starts.iter().copied().filter(|(other, _)| other.effect.name != part.effect.name).collect();
+            base.as_ref().map_or(Vec::new(), |base| self.extend(base, false, &others))
+        };
+        let mut exchanged: Vec<Judged> = without.iter().flat_map(exchange).collect();
         exchanged.retain(|judged| !next.iter().any(|known| same_effects(known, judged) && known.score >= judged.score));
-        let exchanged = self.worth_refining(level, exchanged);
-        next.retain(|known| !exchanged.iter().any(|judged| same_effects(known, judged)));
-        next.extend(exchanged);
-        sorted(next)
+        next.extend(self.worth_refining(level, exchanged));
+        each_once(next)
     }
 
     /// Of hypotheses those that may be worth more effects than a level has, each once, refined, the best first.
@@ -472,7 +475,7 @@ impl<'a, 'b> Search<'a, 'b> {
         Some(self.judge(self.bench.exact_fit(&hypothesis, &start, Scope::All)?))
     }
 
-    /// Whether an error is no reason to call a model wrong.
+    /// Whether an error is no reason to call a model wrong, nor to look for more than one cause.
     fn is_sound(&self, losses: &[Loss]) -> bool {
         let data = &self.bench.data;
         let doubt = |signal| NOISE_DOUBT * data.noise_doubt(signal);
@@ -536,7 +539,7 @@ impl<'a, 'b> Search<'a, 'b> {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
             Some(Chosen {
                 verdict,
-                best: self.baseline.clone(),
+                left: self.baseline.losses.clone(),
                 model,
                 saw_all: false,
                 alternatives: Vec::new(),
@@ -550,6 +553,7 @@ impl<'a, 'b> Search<'a, 'b> {
             return refused(wrong);
         }
         let told = self.simplest(&best);
+        let size = told.fitted.hypothesis.size();
         let model = self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, Scope::Training)?;
         if model.hypothesis.is_impossible(&model.parameters) {
             return refused(wrong);
@@ -560,7 +564,7 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         let model = if holds_out { model } else { told.fitted };
         let of_as_many = levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
-        let rivals = self.rivals(&best, of_as_many.map_or(&[], |level| level));
+        let rivals = self.rivals(&best, size, of_as_many.map_or(&[], |level| level));
         let alternatives: Vec<Vec<&'static str>> =
             best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
         let verdict = if alternatives.iter().any(|a| !a.is_empty()) {
@@ -571,7 +575,7 @@ impl<'a, 'b> Search<'a, 'b> {
             Verdict::PartlyExplained
         };
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
-        Some(Chosen { verdict, model, best: best.fitted, saw_all: !holds_out, alternatives, rivals, singles })
+        Some(Chosen { verdict, model, left: best.fitted.losses, saw_all: !holds_out, alternatives, rivals, singles })
     }
 
     /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
@@ -606,23 +610,22 @@ impl<'a, 'b> Search<'a, 'b> {
         Some(gain(&without, &with) > 0.0 && explained > least_explained(trained).1)
     }
 
-    /// Hypotheses that explain the data as well as the best: all that the odds allow, or else the one whose forms may be why it
-    /// is not the best.
-    fn rivals<'l>(&self, best: &Judged, level: &'l [Judged]) -> Vec<&'l Judged> {
+    /// Hypotheses that explain the data as well as the best, which is told with `size` parameters: all that the odds allow, or else
+    /// the one whose forms may be why it is not the best.
+    fn rivals<'l>(&self, best: &Judged, size: usize, level: &'l [Judged]) -> Vec<&'l Judged> {
         let possible = level.iter().filter(|other| {
             !same_effects(other, best) && !other.fitted.hypothesis.is_impossible(&other.fitted.parameters)
         });
         let (equal, behind): (Vec<_>, Vec<_>) =
             possible.partition(|other| evidence(&other.fitted, &best.fitted) < RIVAL);
-        let by_form = || behind.into_iter().find(|other| self.differ_by_form(best, other));
+        let by_form = || behind.into_iter().find(|other| self.differ_by_form(best, size, other));
         if equal.is_empty() { by_form().into_iter().collect() } else { equal }
     }
 
     /// Whether two hypotheses leave so little that their forms decide between them, and not their causes. A cause in a simpler
     /// form is as good as long as forms may leave as much; of several causes one would be as small as that.
-    fn differ_by_form(&self, best: &Judged, other: &Judged) -> bool {
-        let is_simpler =
-            best.fitted.hypothesis.parts.len() == 1 && other.fitted.hypothesis.size() < best.fitted.hypothesis.size();
+    fn differ_by_form(&self, best: &Judged, size: usize, other: &Judged) -> bool {
+        let is_simpler = best.fitted.hypothesis.parts.len() == 1 && other.fitted.hypothesis.size() < size;
         let [before, of_best, of_other] =
             [&self.baseline, &best.fitted, &other.fitted].map(|fitted| beyond_noise(&fitted.losses));
         before.into_iter().all(|(signal, before)| {
@@ -647,6 +650,19 @@ fn least_explained(fitted: &Fitted) -> (f64, f64) {
 /// How many effects the hypotheses of a level have; 0 where there are none.
 fn effects_of(level: &[Judged]) -> usize {
     level.first().map_or(0, |judged| judged.fitted.hypothesis.parts.len())
+}
+
+/// The best hypothesis of each set of effects, one that is possible where there is one; the best first.
+fn each_once(judged: Vec<Judged>) -> Vec<Judged> {
+    let (impossible, possible): (Vec<_>, Vec<_>) =
+        judged.into_iter().partition(|judged| judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters));
+    let mut once: Vec<Judged> = Vec::new();
+    for judged in sorted(possible).into_iter().chain(sorted(impossible)) {
+        if !once.iter().any(|known| same_effects(known, &judged)) {
+            once.push(judged);
+        }
+    }
+    sorted(once)
 }
 
 /// From where each effect is best fitted.

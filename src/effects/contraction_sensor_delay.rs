@@ -1,7 +1,7 @@
 use super::{Description, Effect, Holds};
 
 /// Time constant in s below which a filter shows nothing.
-const SHORTEST: f64 = 1e-4;
+const SHORTEST: f64 = 1e-3;
 
 crate::variables::variables! {
     /// A position sensor that is late.
@@ -15,7 +15,7 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// Filters and buses of sensors: up to some tenths of a second. Between steps of the integration the contraction is
-    /// interpolated by cubics, whose mean and response are exact. Motion that is prescribed by readings is moved by d + a/2 + τ.
+    /// interpolated by cubics, whose mean is exact, and whose response is but for steps above 250 τ; τ below 1 ms counts as none. Motion that is prescribed by readings is moved by d + a/2 + τ.
     ///
     /// # Reference
     /// Definition of a delay, of a moving average and of a filter.
@@ -74,7 +74,7 @@ impl Effect for ContractionSensorDelay {
         if self.averaging > 0.0 {
             parts.push(format!("shows a mean over {}", milliseconds(self.averaging)));
         }
-        if self.filter_time > 0.0 {
+        if self.contraction_filter() > 0.0 {
             parts.push(format!("has a filter of {}", milliseconds(self.filter_time)));
         }
         let shows = if parts.is_empty() { String::new() } else { format!(": it {}", parts.join(" and ")) };

@@ -28,7 +28,7 @@ crate::variables::variables! {
     /// sign function replaced by h; tanh(v/v₀): S. Andersson, A. Söderberg, S. Björklund (2007), Friction models for sliding
     /// dry, boundary and mixed lubricated contacts, doi 10.1016/j.triboint.2005.11.014.
     pub struct FrictionHysteresis in "friction_hysteresis." as Tunable {
-        /// Half width of the loop at zero pressure
+        /// Half width of the loop at zero pressure and pull
         half_width: f64 = 0.0, NEWTON, (0.0..=300.0);
         /// Growth of the half width with gauge pressure
         half_width_per_pressure: f64 = 0.0, SQUARE_METRE, (0.0..=1e-3);

@@ -69,7 +69,7 @@ impl Effect for Leakage {
     const DESCRIPTION: Description = Description {
         name: "leakage",
         meaning: "pressure is lost in proportion to pressure",
-        equation: "dp/dt <- dp/dt - k ((1 - c) q (q/2 bar)^(e-1) + c (p + p_a) psi(p)), q = max(p - p_o, 0)",
+        equation: "dp/dt <- dp/dt - k ((1 - c) q (q/2 bar)^(e-1) + c (p + p_a) psi(p)), q = max(p - p_o, 0), times (1 + o x/0.1 m)/(1 + g x/0.1 m)",
         signature: "decay with the valve shut; shortfall of the pressure while regulated, and a faster response",
         experiment: "shut the valve and watch the pressure for a minute",
         reference: "ISO 6358",
@@ -96,11 +96,7 @@ impl Effect for Leakage {
         }
         let pressure = at.gauge_pressure.max(0.0);
         let grown = |growth: f64| (1.0 + growth * at.relative_contraction()).max(0.1);
-        let mut leak = self.rate * self.flow(pressure);
-        if self.opening_with_contraction != 0.0 {
-            leak *= grown(self.opening_with_contraction);
-        }
-        rate - leak / grown(self.volume_growth)
+        rate - self.rate * self.flow(pressure) * grown(self.opening_with_contraction) / grown(self.volume_growth)
     }
 
     fn sentence(&self) -> String {
@@ -110,6 +106,8 @@ impl Effect for Leakage {
             small if small >= 10.0 => format!("{:.1} mbar", small * 1e-2),
             tiny => format!("{tiny:.2} Pa"),
         };
-        format!("The muscle leaks: at 2 bar it loses {told} per second.")
+        let length =
+            if self.opening_with_contraction > 0.0 || self.volume_growth > 0.0 { " and its rest length" } else { "" };
+        format!("The muscle leaks: at 2 bar{length} it loses {told} per second.")
     }
 }

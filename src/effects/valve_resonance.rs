@@ -5,8 +5,8 @@ crate::variables::variables! {
     ///
     /// # Model
     /// d²q/dt² = ω² e (1 + k tanh(|e|/1 bar)) − 2 ζ ω dq/dt, e = p_target − q, in place of the first-order valve:
-    /// `natural_frequency` ω, `damping_ratio` ζ, times 1 + `emptying_excess` while q falls, `stiffening` k with the size of the
-    /// error. There is no resonance at ω = 0. A regulator with a proportional part acts on the error by the share l of its damping: 2 ζ ω l dp_target/dt more, `lead` l. The pressure is q itself, or follows it as a main stage follows its pilot, τ dp/dt = q − p, `main_stage` τ.
+    /// `natural_frequency` ω, `damping_ratio` ζ, `stiffening` k with the size of the error. While q falls, what damps dq/dt is
+    /// 1 + `emptying_excess` times as large. There is no resonance at ω = 0. A regulator with a proportional part acts on the error by the share l of its damping: 2 ζ ω l dp_target/dt more, `lead` l. The pressure is q itself, or follows it as a main stage follows its pilot, τ dp/dt = q − p, `main_stage` τ.
     ///
     /// # In the data
     /// The pressure rings after a step; its gain exceeds one near ω.
