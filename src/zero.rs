@@ -5,6 +5,8 @@ use std::fmt::Write;
 
 /// Period in s of the fastest swing that is still a zero's, and not a signal.
 pub(crate) const FASTEST: f64 = 8.0;
+/// Time constant in s of the fastest settling: what is over sooner is how the recording starts.
+const FASTEST_SETTLING: f64 = 1.0;
 /// Period in s of the slowest swing.
 pub(crate) const SLOWEST: f64 = 1000.0;
 
@@ -54,9 +56,10 @@ impl Course {
 
     /// Whether its parts are such as zeros have: inside their bounds, and slow.
     pub fn is_plausible(&self) -> bool {
-        let (swing, period, _) = self.swing;
-        let are_inside = [self.settling.0, swing, self.shift.0].iter().all(|part| part.abs() < self.most);
-        are_inside && (swing == 0.0 || (period > FASTEST && period < SLOWEST))
+        let ((settling, constant), (swing, period, _)) = (self.settling, self.swing);
+        let are_inside = [settling, swing, self.shift.0].iter().all(|part| part.abs() < self.most);
+        let settles_slowly = settling == 0.0 || constant > FASTEST_SETTLING;
+        are_inside && settles_slowly && (swing == 0.0 || (period > FASTEST && period < SLOWEST))
     }
 
     /// What follows a sentence about the offset, whose amounts are told with their unit; nothing of what is too small to be told.

@@ -371,6 +371,8 @@ impl<'a, 'b> Search<'a, 'b> {
         // What hangs on details hangs on what the corrections do here, too.
         let slopes = self.bench.slopes_of(&judged.fitted);
         let better = ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes));
+        // A refinement that ends where the cause cannot be says nothing of the cause.
+        let better = better.filter(|better| is_possible(better) || !is_possible(&judged));
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
@@ -613,9 +615,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Hypotheses that explain the data as well as the best, which is told with `size` parameters: all that the odds allow, or else
     /// the one whose forms may be why it is not the best.
     fn rivals<'l>(&self, best: &Judged, size: usize, level: &'l [Judged]) -> Vec<&'l Judged> {
-        let possible = level.iter().filter(|other| {
-            !same_effects(other, best) && !other.fitted.hypothesis.is_impossible(&other.fitted.parameters)
-        });
+        let possible = level.iter().filter(|other| !same_effects(other, best) && is_possible(other));
         let (equal, behind): (Vec<_>, Vec<_>) =
             possible.partition(|other| evidence(&other.fitted, &best.fitted) < RIVAL);
         let by_form = || behind.into_iter().find(|other| self.differ_by_form(best, size, other));
@@ -654,8 +654,7 @@ fn effects_of(level: &[Judged]) -> usize {
 
 /// The best hypothesis of each set of effects, one that is possible where there is one; the best first.
 fn each_once(judged: Vec<Judged>) -> Vec<Judged> {
-    let (impossible, possible): (Vec<_>, Vec<_>) =
-        judged.into_iter().partition(|judged| judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters));
+    let (possible, impossible): (Vec<_>, Vec<_>) = judged.into_iter().partition(is_possible);
     let mut once: Vec<Judged> = Vec::new();
     for judged in sorted(possible).into_iter().chain(sorted(impossible)) {
         if !once.iter().any(|known| same_effects(known, &judged)) {
@@ -674,9 +673,14 @@ fn same_effects(a: &Judged, b: &Judged) -> bool {
     a.fitted.hypothesis.names() == b.fitted.hypothesis.names()
 }
 
-/// The best hypothesis whose effects are no larger than they can be.
+/// Whether the effects of a hypothesis are such as they can be.
+fn is_possible(judged: &Judged) -> bool {
+    !judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters)
+}
+
+/// The best hypothesis that is possible.
 fn possible(level: &[Judged]) -> Option<&Judged> {
-    level.iter().find(|judged| !judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters))
+    level.iter().find(|judged| is_possible(judged))
 }
 
 /// Ranks of the hypotheses that are carried on: the best, and for each signal the one that leaves least of it, since of two
