@@ -149,7 +149,8 @@ impl Effect for FrictionHysteresis {
 
     fn sentence(&self) -> String {
         let loop_width = 2.0 * self.width(3e5, REFERENCE_FORCE);
-        let pull = if self.half_width_per_pull > 0.0 { format!(" and {REFERENCE_FORCE:.0} N") } else { String::new() };
+        let depends_on_pull = 2.0 * self.half_width_per_pull * REFERENCE_FORCE > 0.5;
+        let pull = if depends_on_pull { format!(" and {REFERENCE_FORCE:.0} N") } else { String::new() };
         format!(
             "Dry friction in the braid: at 3 bar{pull} the muscle pulls {loop_width:.0} N less when it shortens than when it lengthens."
         )
