@@ -161,7 +161,8 @@ impl History {
     }
 
     /// Adds what a filter of first order with a time constant τ in s makes of such a cubic: in parts that are short beside it
-    /// (unless the step is longer than 250 τ), y(h) = x(h) + (y(0) − x(0)) exp(−h/τ) − ∫ exp((s − h)/τ) dx/ds ds by Gauss's rule, and cubics between.
+    /// (unless the step is longer than 250 τ), y(h) = x(h) + (y(0) − x(0)) exp(−h/τ) − ∫ exp((s − h)/τ) dx/ds ds by Gauss's
+    /// rule, and cubics between.
     pub fn push_filtered(&mut self, [start, end]: [f64; 2], values: [f64; 2], rates: [f64; 2], constant: f64) {
         let Some(input) = Piece::hermite([start, end], values, rates) else { return };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

@@ -78,7 +78,7 @@ pub struct Chosen {
     pub model: Fitted,
     /// Whether that fit saw all samples, since the first ones tell too little.
     pub saw_all: bool,
-    /// What the best fit to all samples leaves.
+    /// What the best fit to all samples leaves; nothing where no cause is named.
     left: Vec<Loss>,
     /// Per effect of the model, in its order: effects that could stand in its place.
     pub alternatives: Vec<Vec<&'static str>>,
@@ -160,7 +160,7 @@ impl Chosen {
 
     /// Whether causes are named, and leave more than a sound model may even where they were fitted to all samples.
     pub fn leaves_something(&self, data: &Data) -> bool {
-        self.names_causes() && is_unsound(&self.left, data)
+        is_unsound(&self.left, data)
     }
 
     /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither
@@ -439,18 +439,17 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut next = self.worth_refining(level, more);
         let Some(best) = possible(&next).or(next.first()) else { return next };
         let parts = &best.fitted.hypothesis.parts;
-        let without: Vec<(&Part, Option<Fitted>)> = if !self.may_be_form(&best.fitted.losses) {
+        let without: Vec<(&Part, Fitted)> = if !self.may_be_form(&best.fitted.losses) {
             let earlier = parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
-            earlier.iter().map(|part| (part, self.without(best, part).map(|judged| judged.fitted))).collect()
+            earlier.iter().filter_map(|part| Some((part, self.without(best, part)?.fitted))).collect()
         } else if possible(level).is_some_and(|fewer| self.is_worth(fewer, best)) {
-            parts.iter().map(|part| (part, self.bench.neutralised(&best.fitted, part.effect))).collect()
+            parts.iter().filter_map(|part| Some((part, self.bench.neutralised(&best.fitted, part.effect)?))).collect()
         } else {
             Vec::new()
         };
-        let exchange = |(part, base): &(&Part, Option<Fitted>)| {
-            let others: Vec<_> =
-                starts.iter().copied().filter(|(other, _)| other.effect.name != part.effect.name).collect();
-            base.as_ref().map_or(Vec::new(), |base| self.extend(base, false, &others))
+        let exchange = |(part, base): &(&Part, Fitted)| {
+            let others = starts.iter().copied().filter(|(other, _)| other.effect.name != part.effect.name);
+            self.extend(base, false, &others.collect::<Vec<_>>())
         };
         let mut exchanged: Vec<Judged> = without.iter().flat_map(exchange).collect();
         exchanged.retain(|judged| !next.iter().any(|known| same_effects(known, judged) && known.score >= judged.score));
@@ -460,14 +459,8 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Of hypotheses those that may be worth more effects than a level has, each once, refined, the best first.
     fn worth_refining(&self, level: &[Judged], more: Vec<Judged>) -> Vec<Judged> {
-        let mut once: Vec<Judged> = Vec::new();
-        for judged in sorted(more) {
-            let may_be = possible(level).is_none_or(|fewer| self.further(fewer, &judged) > MAY_GO_FURTHER);
-            if may_be && !once.iter().any(|known| same_effects(known, &judged)) {
-                once.push(judged);
-            }
-        }
-        self.refined_best(once)
+        let may_be = |judged: &Judged| possible(level).is_none_or(|fewer| self.further(fewer, judged) > MAY_GO_FURTHER);
+        self.refined_best(first_of_each(sorted(more).into_iter().filter(may_be)))
     }
 
     /// A hypothesis fitted without one of its effects.
@@ -541,7 +534,7 @@ impl<'a, 'b> Search<'a, 'b> {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
             Some(Chosen {
                 verdict,
-                left: self.baseline.losses.clone(),
+                left: Vec::new(),
                 model,
                 saw_all: false,
                 alternatives: Vec::new(),
@@ -629,11 +622,10 @@ impl<'a, 'b> Search<'a, 'b> {
         let [before, of_best, of_other] =
             [&self.baseline, &best.fitted, &other.fitted].map(|fitted| beyond_noise(&fitted.losses));
         before.into_iter().all(|(signal, before)| {
-            let alike = ALSO_BY_FORM * of_best[&signal];
+            let alike = if is_simpler { f64::INFINITY } else { ALSO_BY_FORM * of_best[&signal] };
             // A sound model may have its structural error, too, and then that decides.
             let structure = self.bench.data.structure(signal).min(LEFT_BY_FORM * before);
-            let most = if is_simpler { left_by_form(before) } else { alike.min(left_by_form(before)) };
-            of_other[&signal] <= NEGLIGIBLE.max(structure).max(most)
+            of_other[&signal] <= NEGLIGIBLE.max(structure).max(alike.min(left_by_form(before)))
         })
     }
 }
@@ -655,13 +647,18 @@ fn effects_of(level: &[Judged]) -> usize {
 /// The best hypothesis of each set of effects, one that is possible where there is one; the best first.
 fn each_once(judged: Vec<Judged>) -> Vec<Judged> {
     let (possible, impossible): (Vec<_>, Vec<_>) = judged.into_iter().partition(is_possible);
+    sorted(first_of_each(sorted(possible).into_iter().chain(sorted(impossible))))
+}
+
+/// Of hypotheses with the same effects the first one.
+fn first_of_each(judged: impl Iterator<Item = Judged>) -> Vec<Judged> {
     let mut once: Vec<Judged> = Vec::new();
-    for judged in sorted(possible).into_iter().chain(sorted(impossible)) {
+    for judged in judged {
         if !once.iter().any(|known| same_effects(known, &judged)) {
             once.push(judged);
         }
     }
-    sorted(once)
+    once
 }
 
 /// From where each effect is best fitted.

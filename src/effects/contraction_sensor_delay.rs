@@ -15,7 +15,8 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// Filters and buses of sensors: up to some tenths of a second. Between steps of the integration the contraction is
-    /// interpolated by cubics, whose mean is exact, and whose response is but for steps above 250 τ; τ below 1 ms counts as none. Motion that is prescribed by readings is moved by d + a/2 + τ.
+    /// interpolated by cubics, whose mean is exact, and whose response is but for steps above 250 τ; τ below 1 ms counts as
+    /// none. Motion that is prescribed by readings is moved by d + a/2 + τ.
     ///
     /// # Reference
     /// Definition of a delay, of a moving average and of a filter.
