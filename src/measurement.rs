@@ -65,6 +65,8 @@ pub struct Recording {
     pub path: PathBuf,
     /// What people call it.
     name: String,
+    /// Its number among those that were read together, from 1; `None` where it was read alone.
+    number: Option<usize>,
     /// Time in s, strictly increasing, shape `(n_samples,)`.
     pub time: Vec<f64>,
     /// Line of the file that each sample stands in, shape `(n_samples,)`; empty where there is no file.
@@ -134,13 +136,14 @@ impl Recording {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let time = signals.remove(&Time).unwrap_or_default();
         let units = columns.iter().flatten().map(|column| (column.signal, column.unit)).collect();
-        Self { path: path.to_owned(), name, time, lines, signals, units, notes }.checked()
+        Self { path: path.to_owned(), name, number: None, time, lines, signals, units, notes }.checked()
     }
 
     /// An experiment that is yet to be made: its inputs in SI units, each of shape `(n_samples,)`.
     pub(crate) fn planned(name: &str, time: Vec<f64>, inputs: BTreeMap<Signal, Vec<f64>>) -> Self {
         let (path, name) = (PathBuf::from(name), name.to_owned());
-        Self { path, name, time, lines: Vec::new(), signals: inputs, units: BTreeMap::new(), notes: Vec::new() }
+        let (lines, units, notes) = (Vec::new(), BTreeMap::new(), Vec::new());
+        Self { path, name, number: None, time, lines, signals: inputs, units, notes }
     }
 
     /// Refuses what no use could be made of, and drops rows without a new time.
@@ -283,13 +286,18 @@ impl Recording {
         values[around].iter().enumerate().map(|(k, value)| share(k) * value).sum()
     }
 
+    /// Its number among those that were read together, from 1; `None` where it was read alone.
+    pub fn number(&self) -> Option<usize> {
+        self.number
+    }
+
     /// File name for people, with its folder only where another recording has the same.
     pub fn name(&self) -> String {
         self.name.clone()
     }
 }
 
-/// Reads several recordings and sees to it that their names differ.
+/// Reads several recordings, numbers them, and sees to it that their names differ.
 ///
 /// # Errors
 /// As [`Recording::read`]; [`Error::Recording`] for a file that is given twice.
@@ -307,7 +315,16 @@ pub fn read_all(paths: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<R
             recording.name = recording.path.display().to_string();
         }
     }
-    Ok(recordings)
+    Ok(numbered(recordings))
+}
+
+/// Recordings that are used together, with their numbers, where they are several.
+pub fn numbered(mut recordings: Vec<Recording>) -> Vec<Recording> {
+    let several = recordings.len() > 1;
+    for (index, recording) in recordings.iter_mut().enumerate() {
+        recording.number = several.then_some(index + 1);
+    }
+    recordings
 }
 
 /// A column that is understood.

@@ -39,8 +39,16 @@ impl Replay {
     }
 }
 
-/// Samples whose mean is taken as the pressure at the start.
+/// Samples whose mean is taken as the pressure at the start, at least; and longest time in s over which it is taken where the
+/// pressure rests.
 const START_SAMPLES: usize = 5;
+const START_SPAN: f64 = 1.0;
+/// How many times as many samples there must be to tell whether it rests, and the standard deviations by which their last quarter
+/// may then differ from the first one: a straight line makes 2.6 of it, an exponential over 15 time constants 1.5.
+const TO_TELL: usize = 4;
+const AT_REST: f64 = 1.2;
+/// Share of its span within which a command is held.
+const HELD: f64 = 1e-3;
 
 /// Simulates an experiment with its recorded inputs, which are joined by straight lines.
 ///
@@ -60,11 +68,11 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
 /// # Errors
 /// As [`replay`].
 pub fn replay_within(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
+    let mut parameters = in_recording(parameters, recording);
     let Some(command) = recording.bridged(Signal::Command) else {
-        return replay_pull(parameters, recording, tolerance);
+        return replay_pull(&parameters, recording, tolerance);
     };
-    let mut parameters = *parameters;
-    parameters.initial.gauge_pressure = initial_pressure(&parameters, recording, command[0]);
+    parameters.initial.gauge_pressure = initial_pressure(&parameters, recording, &command);
     let time = &recording.time;
     if let Some(mass) = recording.load_mass() {
         parameters.load.mass = mass;
@@ -89,12 +97,21 @@ pub fn replay_within(parameters: &Parameters, recording: &Recording, tolerance: 
     )
 }
 
+/// The parameters as they are in a recording that is one of several.
+pub(crate) fn in_recording(parameters: &Parameters, recording: &Recording) -> Parameters {
+    let mut parameters = *parameters;
+    if let Some(number) = recording.number() {
+        parameters.effects.in_recording(number);
+    }
+    parameters
+}
+
 /// Simulates the muscle alone, from measured pressure and contraction to force: free of errors of valve and load.
 ///
 /// # Errors
 /// As [`replay`].
 pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
-    replay_pull(parameters, recording, TOLERANCE)
+    replay_pull(&in_recording(parameters, recording), recording, TOLERANCE)
 }
 
 fn replay_pull(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
@@ -115,17 +132,37 @@ fn replay_pull(parameters: &Parameters, recording: &Recording, tolerance: f64) -
 }
 
 /// Gauge pressure in Pa at the start of a recording.
-fn initial_pressure(parameters: &Parameters, recording: &Recording, command: f64) -> f64 {
+fn initial_pressure(parameters: &Parameters, recording: &Recording, command: &[f64]) -> f64 {
     match recording.bridged(Signal::GaugePressure) {
         Some(readings) => {
-            let first = mean(&readings[..START_SAMPLES.min(readings.len())]);
-            parameters.effects.true_pressure(first, 0.0).max(0.0)
+            let time = &recording.time;
+            let first = 0..resting(time, command, &readings);
+            let pressures = first.map(|k| parameters.effects.true_pressure(readings[k], time[k] - time[0]));
+            mean(&pressures.collect::<Vec<_>>()).max(0.0)
         }
         None => {
             let contraction = recording.bridged(Signal::Contraction).map_or(0.0, |readings| readings[0]);
-            steady_pressure(parameters, command, parameters.effects.true_contraction(contraction, 0.0, 0.0))
+            steady_pressure(parameters, command[0], parameters.effects.true_contraction(contraction, 0.0, 0.0))
         }
     }
+}
+
+/// How many of the first readings show the pressure at the start: as many as there are before the command moves, unless they move
+/// by themselves.
+fn resting(time: &[f64], command: &[f64], readings: &[f64]) -> usize {
+    let few = START_SAMPLES.min(readings.len());
+    let [least, most] = [f64::min, f64::max].map(|of| command.iter().copied().fold(command[0], of));
+    let is_held =
+        |k: &usize| (command[*k] - command[0]).abs() <= HELD * (most - least) && time[*k] - time[0] <= START_SPAN;
+    let held = &readings[..(0..readings.len()).take_while(is_held).count()];
+    if held.len() < TO_TELL * few {
+        return few;
+    }
+    let level = mean(held);
+    let variance = held.iter().map(|reading| (reading - level).powi(2)).sum::<f64>() / held.len() as f64;
+    let quarter = held.len() / 4;
+    let moves = (mean(&held[..quarter]) - mean(&held[held.len() - quarter..])).abs() > AT_REST * variance.sqrt();
+    if moves { few } else { held.len() }
 }
 
 /// A prescribed motion behind the readings of the position sensor.

@@ -16,6 +16,10 @@ pub struct Course {
     pub most: f64,
     /// Where it stays when nothing else is at work.
     pub offset: f64,
+    /// By how much it is higher in the second and in the third recording.
+    pub anew: [f64; 2],
+    /// Which recording it is, from 1.
+    pub recording: f64,
     /// Excess at the start, and time constant in s of its settling.
     pub settling: (f64, f64),
     /// Amplitude by which it swings, period in s and phase in rad at the start.
@@ -25,13 +29,13 @@ pub struct Course {
 }
 
 impl Course {
-    /// o + s exp(−t/τ) + a sin(2π t/T + φ) + j times how far a ramp over d around t_j has come; before the start as there.
+    /// o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + j times how far a ramp over d around t_j has come; before the start as there.
     pub fn at(&self, time: f64) -> f64 {
         let time = time.max(0.0);
         let (settling, constant) = self.settling;
         let (swing, period, phase) = self.swing;
         let (shift, middle, lasts) = self.shift;
-        let mut zero = self.offset;
+        let mut zero = self.offset + self.own();
         if settling != 0.0 {
             zero += settling * (-time / constant).exp();
         }
@@ -44,6 +48,15 @@ impl Course {
         zero
     }
 
+    /// By how much it is higher than in the first recording.
+    fn own(&self) -> f64 {
+        match self.recording {
+            2.0 => self.anew[0],
+            3.0 => self.anew[1],
+            _ => 0.0,
+        }
+    }
+
     /// Whether it stays where it is.
     pub fn is_constant(&self) -> bool {
         self.settling.0 == 0.0 && self.swing.0 == 0.0 && self.shift.0 == 0.0
@@ -51,13 +64,14 @@ impl Course {
 
     /// Whether it is always right.
     pub fn is_neutral(&self) -> bool {
-        self.offset == 0.0 && self.is_constant()
+        self.offset == 0.0 && self.anew == [0.0; 2] && self.is_constant()
     }
 
     /// Whether its parts are such as zeros have: inside their bounds, and slow.
     pub fn is_plausible(&self) -> bool {
         let ((settling, constant), (swing, period, _)) = (self.settling, self.swing);
-        let are_inside = [settling, swing, self.shift.0].iter().all(|part| part.abs() < self.most);
+        let [second, third] = self.anew;
+        let are_inside = [settling, swing, self.shift.0, second, third].iter().all(|part| part.abs() < self.most);
         let settles_slowly = settling == 0.0 || constant > FASTEST_SETTLING;
         are_inside && settles_slowly && (swing == 0.0 || (period > FASTEST && period < SLOWEST))
     }
@@ -69,6 +83,11 @@ impl Course {
         let (shift, middle, _) = self.shift;
         let mut told = String::new();
         let shows = |value: f64| amount(value).contains(|digit: char| ('1'..='9').contains(&digit));
+        for (own, recording) in self.anew.into_iter().zip(["second", "third"]) {
+            if shows(own) {
+                let _ = write!(told, ", {} on top in the {recording} recording", amount(own));
+            }
+        }
         if shows(settling) {
             let _ = write!(told, ", {} on top at the start, which settles within {constant:.1} s", amount(settling));
         }
@@ -97,6 +116,12 @@ macro_rules! zero {
             pub struct $Struct in $prefix as Tunable {
                 #[doc = $description]
                 offset: f64 = 0.0, $unit, (-$most..=$most);
+                /// By how much the offset is higher in the second of several recordings
+                second: f64 = 0.0, $unit, (-$most..=$most);
+                /// By how much it is higher in the third
+                third: f64 = 0.0, $unit, (-$most..=$most);
+                /// Which of the recordings is simulated
+                recording: f64 = 1.0, ONE, (1.0..=1000.0);
                 /// Excess of the offset at the start, which settles
                 settling: f64 = 0.0, $unit, (-$most..=$most);
                 /// Time constant of the settling
@@ -118,6 +143,15 @@ macro_rules! zero {
 
         impl $Struct {
             const CONSTANT: &'static [$crate::effects::Freed] = &[(concat!($prefix, "offset"), &[$size, -$size])];
+            /// Set anew in the second recording.
+            const OF_TWO: &'static [$crate::effects::Freed] =
+                &[(concat!($prefix, "offset"), &[$size]), (concat!($prefix, "second"), &[$size, -2.0 * $size])];
+            /// Set anew in the second recording and in the third.
+            const OF_THREE: &'static [$crate::effects::Freed] = &[
+                (concat!($prefix, "offset"), &[$size]),
+                (concat!($prefix, "second"), &[$size, -2.0 * $size]),
+                (concat!($prefix, "third"), &[-$size]),
+            ];
             const FURTHER_FORMS: &'static [&'static [$crate::effects::Freed]] = &[
                 &[
                     (concat!($prefix, "offset"), &[$size]),
@@ -139,6 +173,8 @@ macro_rules! zero {
                 $crate::zero::Course {
                     most: $most,
                     offset: self.offset,
+                    anew: [self.second, self.third],
+                    recording: self.recording,
                     settling: (self.settling, self.settling_time),
                     swing: (self.swing, self.swing_period, self.swing_phase),
                     shift: (self.shift, self.shift_time, self.shift_span),

@@ -408,15 +408,18 @@ fn every_form_of_every_effect_acts_on_the_plant() {
         }
         // A form may be one that a refinement means nothing to.
         for (refinement, starts) in effect.refinements {
-            let acts = |form: &&[Freed]| {
+            // Some values are those of one of several recordings.
+            let acts = |(form, recording): (&[Freed], usize)| {
                 let mut with = still;
+                with.effects.in_recording(recording);
                 form.iter().chain(effect.refinements).for_each(|(name, starts)| with.set(name, starts[0]).unwrap());
                 with.set(refinement, starts[0]).unwrap();
                 let mut without = with;
                 without.set(refinement, Parameters::default().get(refinement).unwrap()).unwrap();
                 course(&with) != course(&without)
             };
-            assert!(effect.forms.iter().any(acts), "{refinement}");
+            let mut ways = effect.forms.iter().flat_map(|form| (1..=3).map(move |recording| (*form, recording)));
+            assert!(ways.any(acts), "{refinement}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The diagnosis on recordings made by an independent program (`data/generate.py`), and on spoilt ones.
 
 use sinew::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, Verdict, diagnose};
-use sinew::measurement::Recording;
+use sinew::measurement::{Recording, numbered};
 use sinew::parameters::Parameters;
 use std::path::Path;
 
@@ -78,6 +78,23 @@ fn a_shifted_position_sensor_is_found_in_hanging_and_prescribed_motion() {
         let offset = &found.causes[0].parameters[0];
         assert!((offset.value - 0.02).abs() < 2.5e-3, "{name}: {offset:?}");
     }
+}
+
+#[test]
+fn a_zero_that_is_set_anew_in_each_recording_is_one_cause() {
+    let shifted = |name: &str, millimetres: f64| {
+        recording(name, |_, column, cell| match cell.parse::<f64>() {
+            Ok(value) if column == "contraction" => (value + millimetres).to_string(),
+            _ => cell.to_owned(),
+        })
+    };
+    let found =
+        diagnosis_of(&numbered(vec![shifted("nominal_40kg.csv", 12.0), shifted("prescribed_motion.csv", -6.0)]));
+    assert_eq!((found.verdict, causes(&found)), (Verdict::Explained, vec!["contraction_sensor_offset"]));
+    let value = |name: &str| found.extended.get(&format!("contraction_sensor_offset.{name}")).unwrap();
+    assert!((value("offset") - 12e-3).abs() < 2.5e-3, "{} m", value("offset"));
+    assert!((value("second") + 18e-3).abs() < 2.5e-3, "{} m", value("second"));
+    assert!(found.causes[0].sentence.contains("in the second recording"), "{}", found.causes[0].sentence);
 }
 
 #[test]

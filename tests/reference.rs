@@ -75,6 +75,26 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5)]),
+        ("uneven_pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5), ("creep.return_ratio", 3.0)]),
+        (
+            "known_pull_creep",
+            &[
+                ("creep.pull_amplitude", 0.2),
+                ("creep.time_1", 2.5),
+                ("creep.return_ratio", 3.0),
+                ("creep.nominal_share", 1.0),
+            ],
+        ),
+        (
+            "activated_relaxation",
+            &[
+                ("creep.relaxing_stiffness_1", 1500.0),
+                ("creep.time_1", 1.5),
+                ("creep.relaxing_stiffness_2", 600.0),
+                ("creep.time_2", 8.0),
+                ("creep.activation", 120.0),
+            ],
+        ),
         ("resonance", &[("valve_resonance.natural_frequency", 25.0), ("valve_resonance.damping_ratio", 0.35)]),
         (
             "uneven_resonance",

@@ -59,15 +59,27 @@ pub struct FittedParameter {
     pub unit: &'static str,
 }
 
-/// Which refinements of an effect are free.
+/// Which refinements of an effect are free: a bit for each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refined {
+pub struct Refined(u32);
+
+impl Refined {
     /// None.
-    Not,
-    /// The one at this position.
-    By(usize),
-    /// All.
-    Fully,
+    pub const NOT: Self = Self(0);
+
+    /// The one at a position.
+    pub const fn by(which: usize) -> Self {
+        Self(1 << which)
+    }
+
+    /// All of an effect.
+    pub const fn fully(effect: &Description) -> Self {
+        Self((1 << effect.refinements.len()) - 1)
+    }
+
+    const fn has(self, which: usize) -> bool {
+        self.0 & Self::by(which).0 != 0
+    }
 }
 
 /// An effect at work in one of its forms.
@@ -102,14 +114,18 @@ impl Part {
         self.in_form().iter().chain(self.refinements())
     }
 
-    fn refinements(self) -> impl Iterator<Item = &'static Freed> {
+    /// The refinements that are free, but for those that the form has already.
+    pub fn refinements(self) -> impl Iterator<Item = &'static Freed> {
         let form = self.in_form();
-        let refinements = match self.refined {
-            Refined::Not => &[],
-            Refined::By(which) => &self.effect.refinements[which..=which],
-            Refined::Fully => self.effect.refinements,
-        };
-        refinements.iter().filter(|(name, _)| form.iter().all(|(known, _)| known != name))
+        let free = self.effect.refinements.iter().enumerate().filter(move |(which, _)| self.refined.has(*which));
+        free.map(|(_, refinement)| refinement).filter(|(name, _)| form.iter().all(|(known, _)| known != name))
+    }
+
+    /// With only those of its refinements whose parameters are wanted.
+    pub fn refined_as(self, is_wanted: impl Fn(&str) -> bool) -> Self {
+        let every = self.effect.refinements.iter().enumerate();
+        let wanted = every.filter(|(which, (name, _))| self.refined.has(*which) && is_wanted(name));
+        Self { refined: Refined(wanted.map(|(which, _)| Refined::by(which).0).sum()), ..self }
     }
 
     /// A model with its refinements at their neutral defaults.
@@ -470,7 +486,7 @@ impl<'a> Bench<'a> {
     /// change that the effect makes is scaled and the corrections and the parameters so far adapt, to first order.
     pub fn starts(&self, base: &Fitted, effect: &'static Description) -> Vec<Start> {
         let forms = (0..effect.forms.len()).flat_map(|form| {
-            let part = Part { effect, form, refined: Refined::Not };
+            let part = Part { effect, form, refined: Refined::NOT };
             (0..part.starts()).map(move |choice| (part, choice))
         });
         let mut starts: Vec<Start> = forms.filter_map(|(part, choice)| self.start(base, part, choice)).collect();

@@ -23,7 +23,7 @@ use crate::GRAVITY;
 use crate::effects::Readings;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
-use crate::simulation::{Replay, replay, replay_muscle};
+use crate::simulation::{Replay, in_recording, replay, replay_muscle};
 use std::ops::Range;
 
 /// Time in s on either side that velocity and acceleration are taken from: it keeps a noise of 0.1 mm at 80 Hz below
@@ -176,7 +176,7 @@ impl Variable {
 
 /// A model laid over a recording, whole and cut.
 pub struct Chain<'a> {
-    parameters: &'a Parameters,
+    parameters: Parameters,
     recording: &'a Recording,
     whole: Option<Replay>,
     muscle: Option<Replay>,
@@ -185,11 +185,12 @@ pub struct Chain<'a> {
 impl<'a> Chain<'a> {
     /// Simulates the model over the recording. What cannot be simulated, because measured inputs are too wild or the
     /// model is too far off, has no residual.
-    pub fn new(parameters: &'a Parameters, recording: &'a Recording) -> Self {
+    pub fn new(parameters: &Parameters, recording: &'a Recording) -> Self {
         let measured = |signal| recording.get(signal).is_some();
         let cut = measured(Signal::GaugePressure) && measured(Signal::Contraction) && measured(Signal::Force);
         let muscle = cut.then(|| replay_muscle(parameters, recording).ok()).flatten();
-        Self { parameters, recording, whole: replay(parameters, recording).ok(), muscle }
+        let whole = replay(parameters, recording).ok();
+        Self { parameters: in_recording(parameters, recording), recording, whole, muscle }
     }
 
     /// Residual of a link in SI, shape `(n_samples,)`, NaN where a sample is missing; `None` where the link was not
@@ -229,7 +230,7 @@ impl<'a> Chain<'a> {
     }
 
     fn reading(&self) -> Option<Vec<f64>> {
-        let Parameters { muscle, force_models, .. } = self.parameters;
+        let Parameters { muscle, force_models, .. } = &self.parameters;
         let pressure = self.recording.bridged(Signal::GaugePressure)?;
         let force = self.residual(Link::Muscle)?;
         let at = pressure.iter().zip(self.true_contraction()?);

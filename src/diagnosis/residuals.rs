@@ -156,6 +156,13 @@ impl<'a> Data<'a> {
         segments.map(|segment| span(self.measured(segment))).fold(f64::INFINITY, f64::min)
     }
 
+    /// Mean square of an error that is some share of the largest that a signal shows, relative to that of the noise.
+    pub fn share_of_reading(&self, signal: Signal, share: f64) -> f64 {
+        let of_signal = self.segments.iter().filter(|segment| segment.signal == signal);
+        let largest = of_signal.flat_map(|segment| self.measured(segment)).fold(0.0, |most: f64, v| most.max(v.abs()));
+        (share * largest / self.noise[&signal].level).powi(2)
+    }
+
     /// Mean square of the structural error of a sound nominal muscle relative to that of the noise. What comes before the
     /// muscle has none: the declared tolerance is one of the muscle.
     pub fn structure(&self, signal: Signal) -> f64 {

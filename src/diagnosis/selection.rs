@@ -1,10 +1,13 @@
 //! Which causes are named, if any: forward selection over a beam of hypotheses, with refusal in both directions.
 
-use super::Verdict;
-use super::candidates::{Bench, Fitted, Hypothesis, Part, Refined, Slopes, Start, has_many_minima, neutralised};
+use super::candidates::{
+    Bench, Fitted, Hypothesis, Part, Refined, Slopes, Start, declared, has_many_minima, neutralised,
+};
 use super::residuals::{Data, Loss, Scope};
+use super::{FittedParameter, Verdict};
 use crate::effects::{Effects, Holds};
 use crate::measurement::Signal;
+use crate::parameters::Parameters;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -31,6 +34,9 @@ const MAY_GO_FURTHER: f64 = 0.5;
 const LEAST_BESIDE_FORM: f64 = 1.0;
 /// Error beyond noise, as a share of the variance of the noise, below which nothing is looked for.
 const NEGLIGIBLE: f64 = 0.25;
+/// Logarithm of the likelihood that a parameter without meaning takes along by chance, in one of twenty cases: half of the 95 %
+/// quantile of χ² with one degree of freedom.
+const SPARED: f64 = 1.92;
 /// Share of a signal's error that a named effect may leave because its form differs from the true one: a tenth of its rms.
 const LEFT_BY_FORM: f64 = 0.01;
 /// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
@@ -41,6 +47,8 @@ const MAY_RIVAL: f64 = 0.8;
 /// How many times the structural error of a sound model, or that share of the span where it has none, an error must be to be
 /// called unexplained.
 const UNEXPLAINED: f64 = 9.75;
+/// Share of the largest reading by which a good sensor may drift, class 0.2: no reason to call a model wrong.
+const SENSOR_CLASS: f64 = 0.002;
 /// How many standard deviations of the noise's variance a sound model may leave: 0.1 % of all estimates are off by more.
 const NOISE_DOUBT: f64 = 3.0;
 /// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
@@ -321,7 +329,12 @@ impl<'a, 'b> Search<'a, 'b> {
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;
         }
-        let partly = refined.fitted.hypothesis.parts.iter().any(|part| matches!(part.refined, Refined::By(_)));
+        let partly = refined
+            .fitted
+            .hypothesis
+            .parts
+            .iter()
+            .any(|part| ![Refined::NOT, Refined::fully(part.effect)].contains(&part.refined));
         let further = partly.then(|| self.finished(self.refined(refined.clone())));
         let other = self.in_other_forms(&judged).map(|other| self.finished(self.refined(other)));
         let all = further.into_iter().chain(other).chain([refined.clone()]);
@@ -334,7 +347,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let others =
             (0..last.effect.all_forms().count()).filter(|form| *form != last.form).collect::<Vec<_>>().into_par_iter();
         let fits = others.filter_map(|form| {
-            let part = Part { form, refined: Refined::Not, ..*last };
+            let part = Part { form, refined: Refined::NOT, ..*last };
             let start = self.bench.best_start(&judged.fitted.parameters, *last, part)?;
             let hypothesis = judged.fitted.hypothesis.without(last.effect.name).with(part);
             let fitted = self.bench.rough_fit(&hypothesis, &start)?;
@@ -362,11 +375,13 @@ impl<'a, 'b> Search<'a, 'b> {
         if part.is_rare() {
             return judged;
         }
-        let each = (0..part.effect.refinements.len()).map(Refined::By);
-        let ways: Vec<_> = match part.refined {
-            Refined::Not => [Refined::Not, Refined::Fully].into_iter().chain(each).collect(),
-            Refined::By(_) => vec![Refined::Fully],
-            Refined::Fully => return judged,
+        let fully = Refined::fully(part.effect);
+        let ways: Vec<_> = if part.refined == Refined::NOT {
+            [Refined::NOT, fully].into_iter().chain((0..part.effect.refinements.len()).map(Refined::by)).collect()
+        } else if part.refined == fully {
+            return judged;
+        } else {
+            vec![fully]
         };
         // What hangs on details hangs on what the corrections do here, too.
         let slopes = self.bench.slopes_of(&judged.fitted);
@@ -474,7 +489,9 @@ impl<'a, 'b> Search<'a, 'b> {
     fn is_sound(&self, losses: &[Loss]) -> bool {
         let data = &self.bench.data;
         let doubt = |signal| NOISE_DOUBT * data.noise_doubt(signal);
-        leaves_at_most(losses, |signal| NEGLIGIBLE + doubt(signal) + UNEXPLAINED.powi(2) * data.share_of_span(signal))
+        let of_sensor = |signal| data.share_of_reading(signal, SENSOR_CLASS);
+        let of_structure = |signal| UNEXPLAINED.powi(2) * data.share_of_span(signal);
+        leaves_at_most(losses, |signal| NEGLIGIBLE + doubt(signal) + of_structure(signal).max(of_sensor(signal)))
     }
 
     /// The best hypothesis of all levels, each of which must be worth its effects.
@@ -549,6 +566,7 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         let told = self.simplest(&best);
         let size = told.fitted.hypothesis.size();
+        let told = self.without_idle(told);
         let model = self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, Scope::Training)?;
         if model.hypothesis.is_impossible(&model.parameters) {
             return refused(wrong);
@@ -576,14 +594,48 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
     fn simplest(&self, judged: &Judged) -> Judged {
         let Fitted { hypothesis: Hypothesis { parts }, parameters, .. } = &judged.fitted;
-        if parts.iter().all(|part| part.refined == Refined::Not) {
+        if parts.iter().all(|part| part.refined == Refined::NOT) {
             return judged.clone();
         }
         let start = parts.iter().fold(*parameters, |start, part| part.unrefined(&start));
-        let parts = parts.iter().map(|part| Part { refined: Refined::Not, ..*part }).collect();
+        let parts = parts.iter().map(|part| Part { refined: Refined::NOT, ..*part }).collect();
         let plain = self.bench.exact_fit(&Hypothesis { parts }, &start, Scope::All);
         let plain = plain.filter(|fitted| is_negligible(&fitted.losses)).map(|fitted| self.judge(fitted));
         plain.unwrap_or_else(|| judged.clone())
+    }
+
+    /// The hypothesis without those refinements that may as well be neutral: by their intervals, and by what is lost without them.
+    fn without_idle(&self, judged: Judged) -> Judged {
+        if judged.fitted.hypothesis.parts.iter().all(|part| part.refined == Refined::NOT) {
+            return judged;
+        }
+        let neutral = Parameters::default();
+        let (own, _) = self.bench.intervals(&judged.fitted, Scope::All);
+        let doubt = |own: &FittedParameter| {
+            let away = (own.value - declared(&neutral, own.name).1).abs();
+            away / (own.high - own.value).max(own.value - own.low).max(f64::MIN_POSITIVE)
+        };
+        let parts = &judged.fitted.hypothesis.parts;
+        let is_refinement =
+            |own: &&FittedParameter| parts.iter().any(|part| part.refinements().any(|(name, _)| *name == own.name));
+        let mut idle: Vec<&FittedParameter> = own.iter().filter(is_refinement).filter(|own| doubt(own) < 1.0).collect();
+        idle.sort_by(|a, b| doubt(a).total_cmp(&doubt(b)));
+        let ways = [&idle[..], &idle[..idle.len().min(1)]];
+        let fewer = ways.into_iter().filter(|idle| !idle.is_empty()).find_map(|idle| self.spared(&judged, idle));
+        fewer.map_or(judged, |fewer| self.without_idle(fewer))
+    }
+
+    /// The hypothesis without some of its refinements; `None` where more is lost than chance takes.
+    fn spared(&self, judged: &Judged, idle: &[&FittedParameter]) -> Option<Judged> {
+        let is_wanted = |name: &str| idle.iter().all(|idle| idle.name != name);
+        let parts = &judged.fitted.hypothesis.parts;
+        let hypothesis = Hypothesis { parts: parts.iter().map(|part| part.refined_as(is_wanted)).collect() };
+        let plain = parts.iter().fold(judged.fitted.parameters, |start, part| part.unrefined(&start));
+        let start = hypothesis.at_work_in(&plain, &judged.fitted.parameters);
+        let fewer = self.judge(self.bench.exact_fit(&hypothesis, &start, Scope::All)?);
+        let [likelihood, without] =
+            [judged, &fewer].map(|judged| self.bench.data.log_likelihood(&judged.fitted.losses));
+        (likelihood - without <= SPARED * idle.len() as f64).then_some(fewer)
     }
 
     /// Whether the first samples cannot tell a fit from their own best.

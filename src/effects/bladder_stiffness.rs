@@ -4,8 +4,9 @@ crate::variables::variables! {
     /// A membrane that is stiffer or softer than nominal.
     ///
     /// # Model
-    /// F_e ← F_e (1 + c + c₁ x/0.1 m) − f s (1 + g (s − 1)), s = x/0.1 m: `relative_change` c, `change_with_contraction` c₁. What a tube
-    /// of rubber beside the nominal one pulls back begins with zero: `added_force` f, `added_growth` g.
+    /// F_e ← F_e (1 + c + c₁ x/0.1 m) − f s (1 + g (s − 1) + h (s − 1)²), s = x/0.1 m: `relative_change` c,
+    /// `change_with_contraction` c₁. What a tube of rubber beside the nominal one pulls back begins with zero: `added_force` f,
+    /// `added_growth` g, `added_curvature` h.
     ///
     /// # In the data
     /// The force residual is a single-valued function of the contraction, the same at every pressure, also at none. A
@@ -15,7 +16,7 @@ crate::variables::variables! {
     /// ± 35 % are usual between specimens and with age.
     ///
     /// # Reference
-    /// Thesis eqs. 4.5 and 4.17 (elastic term); second order in the contraction of what a neo-Hookean, Gent or Fung tube adds.
+    /// Thesis eqs. 4.5 and 4.17 (elastic term); third order in the contraction of what a neo-Hookean, Gent or Fung tube adds.
     pub struct BladderStiffness in "bladder_stiffness." as Tunable {
         /// Relative change of the elastic force
         relative_change: f64 = 0.0, ONE, (-0.9..=1.0);
@@ -25,6 +26,8 @@ crate::variables::variables! {
         added_force: f64 = 0.0, NEWTON, (-500.0..=500.0);
         /// Relative growth of its stiffness from 0.1 m to 0.2 m
         added_growth: f64 = 0.0, ONE, (-0.5..=1.5);
+        /// Curvature of that growth
+        added_curvature: f64 = 0.0, ONE, (-1.0..=1.0);
     }
 }
 
@@ -32,7 +35,7 @@ impl Effect for BladderStiffness {
     const DESCRIPTION: Description = Description {
         name: "bladder_stiffness",
         meaning: "the passive elastic force differs from nominal",
-        equation: "F_e <- F_e (1 + c + c1 s) - f s (1 + g (s - 1)), s = x/0.1 m",
+        equation: "F_e <- F_e (1 + c + c1 s) - f s (1 + g (s - 1) + h (s - 1)^2), s = x/0.1 m",
         signature: "force residual depends on contraction alone, also at zero pressure",
         experiment: "stretch the muscle without pressure; the same motion at two constant pressures",
         reference: "thesis eqs. 4.5, 4.17",
@@ -46,7 +49,10 @@ impl Effect for BladderStiffness {
             ],
         ],
         further_forms: &[],
-        refinements: &[("bladder_stiffness.change_with_contraction", &[0.1])],
+        refinements: &[
+            ("bladder_stiffness.change_with_contraction", &[0.1]),
+            ("bladder_stiffness.added_curvature", &[0.1]),
+        ],
     };
 
     fn is_neutral(&self) -> bool {
@@ -55,7 +61,8 @@ impl Effect for BladderStiffness {
 
     fn elastic_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
         let s = at.relative_contraction();
-        let added = self.added_force * s * (1.0 + self.added_growth * (s - 1.0));
+        let beyond = s - 1.0;
+        let added = self.added_force * s * (1.0 + beyond * (self.added_growth + beyond * self.added_curvature));
         force * (1.0 + self.relative_change + self.change_with_contraction * s) - added
     }
 

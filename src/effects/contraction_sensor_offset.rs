@@ -5,7 +5,7 @@ zero! {
     /// A position sensor whose zero is not at the rest length.
     ///
     /// # Model
-    /// x_measured ← x_measured + o + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling` s,
+    /// x_measured ← x_measured + o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `second` and `third` o_k in recording k, `settling` s,
     /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
     /// `shift_span` around `shift_time`.
     ///
@@ -14,7 +14,7 @@ zero! {
     ///
     /// # Validity
     /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
-    /// once by a shock; in every recording alike, from its start.
+    /// once by a shock; in every recording alike, from its start, but for a constant that may be another one in each of up to three.
     ///
     /// # Reference
     /// Definition of an offset.
@@ -28,7 +28,7 @@ impl Effect for ContractionSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "contraction_sensor_offset",
         meaning: "the zero of the position sensor is not at the rest length",
-        equation: "x_measured <- x_measured + o + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
+        equation: "x_measured <- x_measured + o + o_k + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the contraction, also at rest",
         experiment: "read the sensor with the muscle empty and unloaded",
         reference: "definition",
@@ -36,6 +36,8 @@ impl Effect for ContractionSensorOffset {
         holds: Holds::Exactly,
         forms: &[
             Self::CONSTANT,
+            Self::OF_TWO,
+            Self::OF_THREE,
             // Corrections of the muscle take a constant offset over, and leave how it settles.
             &[
                 ("contraction_sensor_offset.offset", &[5e-3, -5e-3, 5e-3, -5e-3]),
@@ -53,6 +55,10 @@ impl Effect for ContractionSensorOffset {
 
     fn is_plausible(&self) -> bool {
         self.course().is_plausible()
+    }
+
+    fn in_recording(&mut self, number: f64) {
+        self.recording = number;
     }
 
     fn own_course(&self, time: f64) -> f64 {

@@ -8,9 +8,11 @@ crate::variables::variables! {
     /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing drifts, and
     /// dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The nominal coefficients have the share n of all drift from the rest length already,
     /// `nominal_share`: all of it if they are those of a muscle that was held for long. The pressure pulls by d_F more, with
-    /// τ₁ dd_F/dt + d_F = a_F (A p − A(0) p(0)), `pull_amplitude` a_F. While a drift goes back, its time is `return_ratio` τ.
+    /// τ₁ dd_F/dt + d_F = a_F (A p − A(0) p(0)), `pull_amplitude` a_F, and by the share n of where that goes less. While a drift goes back, its time is `return_ratio` τ; the drift
+    /// of the pull does while the pull falls short of it.
     /// A standard linear solid is stiffer for fast changes: springs kᵢ in parallel with the membrane, `relaxing_stiffness_1` and
-    /// `relaxing_stiffness_2`, pull back with kᵢ eᵢ, deᵢ/dt = dx/dt − eᵢ/τᵢ, with `return_ratio` τᵢ while eᵢ < 0.
+    /// `relaxing_stiffness_2`, pull back with kᵢ eᵢ, deᵢ/dt = dx/dt − sinh(β eᵢ)/(β τᵢ), with `return_ratio` τᵢ while eᵢ < 0: β is
+    /// `activation`, by which what yields thermally yields more readily under stress.
     ///
     /// # In the data
     /// Contraction drifts for seconds at constant measured pressure, unlike up and down; in a prescribed motion the force
@@ -24,7 +26,8 @@ crate::variables::variables! {
     /// # Reference
     /// Kelvin–Voigt model and standard linear solid of viscoelasticity; for muscles T. Minh et al. (2010),
     /// doi 10.1016/j.mechatronics.2010.04.003 (creep and hysteresis of a McKibben muscle). That rubber recovers at another
-    /// pace than it gives way: I. Ward, J. Sweeney (2012), Mechanical Properties of Solid Polymers, ch. 11.
+    /// pace than it gives way, and Eyring's activated flow: I. Ward, J. Sweeney (2012), Mechanical Properties of Solid Polymers,
+    /// ch. 11 and 12.
     pub struct Creep in "creep." as Tunable {
         /// Drift per contraction, first element
         amplitude_1: f64 = 0.0, ONE, (AHEAD..=1.0);
@@ -48,11 +51,15 @@ crate::variables::variables! {
         relaxing_stiffness_2: f64 = 0.0, NEWTON_PER_METRE, (0.0..=5e4);
         /// Time in which a drift goes back, relative to that in which it grows
         return_ratio: f64 = 1.0, ONE, (0.05..=20.0);
+        /// Activation of the flow of what relaxes, per stretch; zero is a linear dashpot
+        activation: f64 = 0.0, PER_METRE, (0.0..=1e4);
     }
 }
 
 /// Times in s from which on something gives way slowly; before, it is viscous.
 const SLOW: f64 = 0.2;
+/// Argument beyond which a hyperbolic sine is cut off: flow is then a thousand times faster than any signal.
+const LARGEST_SINH: f64 = 12.0;
 /// Drift per contraction of a membrane that would push ahead of its load for good.
 const AHEAD: f64 = -0.5;
 
@@ -60,7 +67,22 @@ impl Creep {
     /// Rate of a drift that goes for `aim` with a time constant.
     fn rate(&self, drift: f64, aim: f64, time: f64) -> f64 {
         let lack = aim - drift;
-        lack / if drift * lack < 0.0 { self.return_ratio * time } else { time }
+        lack / self.time(drift * lack < 0.0, time)
+    }
+
+    /// A time constant while something goes back, or does not.
+    fn time(&self, goes_back: bool, time: f64) -> f64 {
+        if goes_back { self.return_ratio * time } else { time }
+    }
+
+    /// Stretch in m that flows off within a time constant, from a stretch in m.
+    fn flow(&self, stretch: f64) -> f64 {
+        let argument = self.activation * stretch;
+        if argument == 0.0 {
+            return stretch;
+        }
+        let argument = argument.abs().min(LARGEST_SINH);
+        stretch * argument.sinh() / argument
     }
 }
 
@@ -89,6 +111,7 @@ impl Effect for Creep {
             ("creep.pull_amplitude", &[0.05]),
             ("creep.return_ratio", &[1.5]),
             ("creep.relaxing_stiffness_2", &[500.0]),
+            ("creep.activation", &[100.0]),
         ],
     };
     /// Both drifts of the contraction, contraction and pull where nothing drifts, the drift of the pull, and how far both springs
@@ -116,15 +139,19 @@ impl Effect for Creep {
         let strain = at.contraction - own[2];
         rates[0] = self.rate(own[0], self.amplitude_1 * strain, self.time_1);
         rates[1] = self.rate(own[1], self.amplitude_2 * strain, self.time_2);
-        rates[4] = self.rate(own[4], self.pull_amplitude * (at.pressure_pull - own[3]), self.time_1);
+        let lack = self.pull_amplitude * (at.pressure_pull - own[3]) - own[4];
+        rates[4] = lack / self.time(lack * self.pull_amplitude < 0.0, self.time_1);
         for (k, time) in [(5, self.time_1), (6, self.time_2)] {
-            let time = if own[k] < 0.0 { self.return_ratio * time } else { time };
-            rates[k] = at.contraction_velocity - own[k] / time;
+            rates[k] = at.contraction_velocity - self.flow(own[k]) / self.time(own[k] < 0.0, time);
         }
     }
 
     fn area_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
-        if self.pull_amplitude == 0.0 { force } else { force + own[4] }
+        if self.pull_amplitude == 0.0 {
+            return force;
+        }
+        let known = self.nominal_share * self.pull_amplitude;
+        force + own[4] - known * (force - own[3])
     }
 
     fn elastic_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {

@@ -5,7 +5,7 @@ zero! {
     /// A force sensor that shows a force where there is none.
     ///
     /// # Model
-    /// F_measured ← F_measured + o + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling` s,
+    /// F_measured ← F_measured + o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `second` and `third` o_k in recording k, `settling` s,
     /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
     /// `shift_span` around `shift_time`.
     ///
@@ -14,7 +14,7 @@ zero! {
     ///
     /// # Validity
     /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
-    /// once by a shock; in every recording alike, from its start.
+    /// once by a shock; in every recording alike, from its start, but for a constant that may be another one in each of up to three.
     ///
     /// # Reference
     /// Definition of an offset.
@@ -28,13 +28,13 @@ impl Effect for ForceSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "force_sensor_offset",
         meaning: "the force sensor shows a force where there is none",
-        equation: "F_measured <- F_measured + o + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
+        equation: "F_measured <- F_measured + o + o_k + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the force, also at rest",
         experiment: "read the sensor with nothing attached",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[Self::CONSTANT],
+        forms: &[Self::CONSTANT, Self::OF_TWO, Self::OF_THREE],
         further_forms: Self::FURTHER_FORMS,
         refinements: Self::REFINEMENTS,
     };
@@ -45,6 +45,10 @@ impl Effect for ForceSensorOffset {
 
     fn is_plausible(&self) -> bool {
         self.course().is_plausible()
+    }
+
+    fn in_recording(&mut self, number: f64) {
+        self.recording = number;
     }
 
     fn own_course(&self, time: f64) -> f64 {

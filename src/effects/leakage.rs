@@ -1,4 +1,4 @@
-use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point};
+use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point, REFERENCE_CONTRACTION};
 
 /// Ratio of pressures below which the flow through a hole is choked: a sharp edge.
 const CRITICAL_RATIO: f64 = 0.3;
@@ -11,9 +11,9 @@ crate::variables::variables! {
     /// Air that is lost while the valve goes on blowing.
     ///
     /// # Model
-    /// dp/dt ← dp/dt − k ((1 − c) q (q/2 bar)^(e−1) + c (p + p_a) ψ(p)) (1 + o x/0.1 m) / (1 + `volume_growth` x/0.1 m), q = max(p − `opening_pressure`, 0):
+    /// dp/dt ← dp/dt − k ((1 − c) q (q/2 bar)^(e−1) + c (p + p_a) ψ(p)) (1 + o s) / (1 + `volume_growth` x/0.1 m), q = max(p − `opening_pressure`, 0):
     /// `rate` k, `exponent` e, `choked_share` c of the leak that is a hole and not a porous wall or a seal that pressure lifts,
-    /// `opening_with_contraction` o of a tear that the growing girth opens. ψ = 1 while
+    /// `opening_with_contraction` o of a tear that the growing girth opens from `opening_contraction` x_o on, s = max(x − x_o, 0)/0.1 m. ψ = 1 while
     /// the flow is choked, p_a/(p + p_a) < b = 0.3, and √(1 − ((p_a/(p + p_a) − b)/(1 − b))²) above. The pressure cannot fall below
     /// ambient.
     ///
@@ -38,8 +38,10 @@ crate::variables::variables! {
         opening_pressure: f64 = 0.0, PASCAL, (0.0..=1e5);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
-        /// Relative growth of the hole at 0.1 m of contraction
-        opening_with_contraction: f64 = 0.0, ONE, (0.0..=20.0);
+        /// Relative growth of the hole per 0.1 m of contraction
+        opening_with_contraction: f64 = 0.0, ONE, (0.0..=1e3);
+        /// Contraction from which on the hole grows
+        opening_contraction: f64 = 0.0, METRE, (0.0..=0.3);
     }
 }
 
@@ -69,13 +71,22 @@ impl Effect for Leakage {
     const DESCRIPTION: Description = Description {
         name: "leakage",
         meaning: "pressure is lost in proportion to pressure",
-        equation: "dp/dt <- dp/dt - k ((1 - c) q (q/2 bar)^(e-1) + c (p + p_a) psi(p)), q = max(p - p_o, 0), times (1 + o x/0.1 m)/(1 + g x/0.1 m)",
+        equation: "dp/dt <- dp/dt - k ((1 - c) q (q/2 bar)^(e-1) + c (p + p_a) psi(p)), q = max(p - p_o, 0), times (1 + o max(x - x_o, 0)/0.1 m)/(1 + g x/0.1 m)",
         signature: "decay with the valve shut; shortfall of the pressure while regulated, and a faster response",
         experiment: "shut the valve and watch the pressure for a minute",
         reference: "ISO 6358",
         of_load: false,
         holds: Holds::AsLaw,
-        forms: &[&[("leakage.rate", &[0.3, 1.0])], &[("leakage.rate", &[0.3, 1.0]), ("leakage.choked_share", &[0.5])]],
+        forms: &[
+            &[("leakage.rate", &[0.3, 1.0])],
+            &[("leakage.rate", &[0.3, 1.0]), ("leakage.choked_share", &[0.5])],
+            // A crack.
+            &[
+                ("leakage.rate", &[0.02]),
+                ("leakage.opening_with_contraction", &[50.0]),
+                ("leakage.opening_contraction", &[0.06, 0.1]),
+            ],
+        ],
         further_forms: &[],
         refinements: &[
             ("leakage.choked_share", &[0.5]),
@@ -95,8 +106,10 @@ impl Effect for Leakage {
             return rate;
         }
         let pressure = at.gauge_pressure.max(0.0);
-        let grown = |growth: f64| (1.0 + growth * at.relative_contraction()).max(0.1);
-        rate - self.rate * self.flow(pressure) * grown(self.opening_with_contraction) / grown(self.volume_growth)
+        let opened = (at.contraction - self.opening_contraction).max(0.0) / REFERENCE_CONTRACTION;
+        let opening = 1.0 + self.opening_with_contraction * opened;
+        let volume = (1.0 + self.volume_growth * at.relative_contraction()).max(0.1);
+        rate - self.rate * self.flow(pressure) * opening / volume
     }
 
     fn sentence(&self) -> String {

@@ -145,6 +145,8 @@ pub trait Effect: Declared + Default {
     fn is_plausible(&self) -> bool {
         true
     }
+    /// Has it be as it is in one of several recordings, by its number from 1.
+    fn in_recording(&mut self, _number: f64) {}
     /// What it does at a time in s since the start whatever the muscle does, where it goes its own way over time; SI.
     fn own_course(&self, _time: f64) -> f64 {
         0.0
@@ -297,6 +299,12 @@ macro_rules! effects {
             /// Whether the values of the effect with this name are such as its cause can have.
             pub fn is_plausible(&self, name: &str) -> bool {
                 true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible()))*
+            }
+
+            /// Has all effects be as they are in one of several recordings, by its number from 1.
+            pub fn in_recording(&mut self, number: usize) {
+                let number = number as f64;
+                $(self.$field.in_recording(number);)*
             }
 
             /// What the effect with this name does at a time in s since the start whatever the muscle does; SI.

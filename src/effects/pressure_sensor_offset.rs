@@ -5,7 +5,7 @@ zero! {
     /// A pressure sensor whose zero is not at ambient pressure.
     ///
     /// # Model
-    /// p_measured ← p_measured + o + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling` s,
+    /// p_measured ← p_measured + o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `second` and `third` o_k in recording k, `settling` s,
     /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
     /// `shift_span` around `shift_time`.
     ///
@@ -15,7 +15,7 @@ zero! {
     ///
     /// # Validity
     /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
-    /// once by a shock; in every recording alike, from its start.
+    /// once by a shock; in every recording alike, from its start, but for a constant that may be another one in each of up to three.
     ///
     /// # Reference
     /// Definition of an offset.
@@ -29,13 +29,13 @@ impl Effect for PressureSensorOffset {
     const DESCRIPTION: Description = Description {
         name: "pressure_sensor_offset",
         meaning: "the zero of the pressure sensor is not at ambient pressure",
-        equation: "p_measured <- p_measured + o + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
+        equation: "p_measured <- p_measured + o + o_k + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the pressure, also at rest",
         experiment: "read the sensor with the muscle open to the air",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[Self::CONSTANT],
+        forms: &[Self::CONSTANT, Self::OF_TWO, Self::OF_THREE],
         further_forms: Self::FURTHER_FORMS,
         refinements: Self::REFINEMENTS,
     };
@@ -46,6 +46,10 @@ impl Effect for PressureSensorOffset {
 
     fn is_plausible(&self) -> bool {
         self.course().is_plausible()
+    }
+
+    fn in_recording(&mut self, number: f64) {
+        self.recording = number;
     }
 
     fn own_course(&self, time: f64) -> f64 {

@@ -4,10 +4,11 @@ crate::variables::variables! {
     /// Something in series with the muscle that stretches: a cable, a fitting, the frame.
     ///
     /// # Model
-    /// Between muscle and load: the load moves by x, the muscle contracts by x + c F₀ (F/F₀)ᵉ with F₀ = 400 N and a pull
+    /// Between muscle and load: the load moves by x, the muscle contracts by x + c F₀ g(F) with F₀ = 400 N and a pull
     /// F > 0; the position sensor shows x. Beside the path of the load, where the frame that carries the sensor gives way:
-    /// x_measured ← x + s F₀ (F/F₀)ᵉ. `load_compliance` c, `compliance` s of either sign, `exponent` e (below 1 a cable
-    /// that hardens).
+    /// x_measured ← x + s F₀ g(F). `load_compliance` c, `compliance` s of either sign; g(F) = (F/F₀)ᵉ, `exponent` e below 1 for a
+    /// cable that hardens, or ((F + F₁)ᵉ − F₁ᵉ)/((F₀ + F₁)ᵉ − F₁ᵉ) for one that hardens beyond a `toe_force` F₁ only: the smaller e, the
+    /// sooner, as a logarithm for 0 and to an end below.
     ///
     /// # In the data
     /// The residual of the contraction is in proportion to the force; a load behind a cable also swings more slowly. A
@@ -24,10 +25,15 @@ crate::variables::variables! {
         compliance: f64 = 0.0, METRE_PER_NEWTON, (-1e-4..=1e-4);
         /// Stretch per pull, at 400 N, of what is between the muscle and its load
         load_compliance: f64 = 0.0, METRE_PER_NEWTON, (0.0..=1e-4);
-        /// Power of the pull with which it stretches
-        exponent: f64 = 1.0, ONE, (0.3..=3.0);
+        /// Power of the pull with which it stretches; at least 0.3 without a toe
+        exponent: f64 = 1.0, ONE, (-3.0..=3.0);
+        /// Pull beyond which it hardens
+        toe_force: f64 = 0.0, NEWTON, (0.0..=5e3);
     }
 }
+
+/// Smallest power without a toe: the stiffness of less is that of a wall.
+const LEAST_EXPONENT: f64 = 0.3;
 
 impl SeriesElasticity {
     /// Way in m that gives way at a pull in N, for a compliance in m/N.
@@ -35,7 +41,18 @@ impl SeriesElasticity {
         if self.exponent == 1.0 || compliance == 0.0 {
             return compliance * force;
         }
-        compliance * REFERENCE_FORCE * (force.max(0.0) / REFERENCE_FORCE).powf(self.exponent)
+        compliance * REFERENCE_FORCE * self.course(force.max(0.0))
+    }
+
+    /// Way at a pull in N, relative to that at the reference.
+    fn course(&self, force: f64) -> f64 {
+        if self.toe_force == 0.0 {
+            return (force / REFERENCE_FORCE).powf(self.exponent.max(LEAST_EXPONENT));
+        }
+        // Nearer to zero the differences are those of rounding.
+        let exponent = self.exponent.abs().max(1e-6).copysign(self.exponent);
+        let grown = |force: f64| (force / self.toe_force).ln_1p();
+        (exponent * grown(force)).exp_m1() / (exponent * grown(REFERENCE_FORCE)).exp_m1()
     }
 }
 
@@ -43,7 +60,7 @@ impl Effect for SeriesElasticity {
     const DESCRIPTION: Description = Description {
         name: "series_elasticity",
         meaning: "cable, fitting or frame stretches with force",
-        equation: "x_muscle <- x + c F0 (F/F0)^e;  x_measured <- x + s F0 (F/F0)^e",
+        equation: "x_muscle <- x + c F0 g(F);  x_measured <- x + s F0 g(F);  g = ((F + F1)^e - F1^e)/((F0 + F1)^e - F1^e)",
         signature: "residual of the contraction in proportion to the force",
         experiment: "lock the load and vary the pressure",
         reference: "Hooke",
@@ -54,7 +71,7 @@ impl Effect for SeriesElasticity {
             &[("series_elasticity.compliance", &[-5e-6, 5e-6])],
         ],
         further_forms: &[],
-        refinements: &[("series_elasticity.exponent", &[0.8])],
+        refinements: &[("series_elasticity.exponent", &[0.8]), ("series_elasticity.toe_force", &[100.0])],
     };
 
     fn is_neutral(&self) -> bool {

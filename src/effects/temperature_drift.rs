@@ -10,16 +10,18 @@ crate::variables::variables! {
     /// Slow change while the muscle warms up.
     ///
     /// # Model
-    /// τ dw/dt = 1 − k + k |P|/(10 W) − w from w = 0 at the start, P = F_p dx/dt the power of the pressure's pull F_p
-    /// without effects; the area counts
-    /// 1 + a w times, the elastic force 1 + e w times: `time_constant` τ, `work_share` k, `area_change` a, `elastic_change` e.
+    /// τ₁ dw₁/dt = 1 − k + k |P|/(10 W) − w₁, and w₂ alike with τ₂; P = F_p dx/dt the power of the pressure's pull F_p without effects. With
+    /// w = (1 − s) w₁ + s w₂ the area counts 1 + a w times, the elastic force 1 + e w times: `time_constant` τ₁, `slow_time_constant` τ₂,
+    /// `slow_share` s, `work_share` k, `area_change` a, `elastic_change` e. Heat that spreads begins sooner and ends later than one
+    /// exponential; heat that first has to come through something begins slowly, s < 0. At the start w₁ = w₂ = 0, but for a second and a third
+    /// recording that begin warm, `second` and `third`.
     ///
     /// # In the data
     /// One cycle differs from the next, the less the later; the force residual grows from zero at the start and stays.
     /// Creep comes back after every step.
     ///
     /// # Validity
-    /// The recording starts cold. Its surroundings warm the muscle, or its own work, of which a fixed share becomes heat; no muscle warms within less than 3 s.
+    /// The first recording starts cold. Its surroundings warm the muscle, or its own work, of which a fixed share becomes heat; no muscle warms within less than 3 s.
     ///
     /// # Reference
     /// Newton's law of cooling; definition.
@@ -32,6 +34,22 @@ crate::variables::variables! {
         time_constant: f64 = 15.0, SECOND, (FASTEST..=1000.0);
         /// Share of the warming that goes with the power of its motion, stated for 10 W
         work_share: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Share of the warming that has another time constant
+        slow_share: f64 = 0.0, ONE, (-3.0..=1.0);
+        /// That time constant
+        slow_time_constant: f64 = 60.0, SECOND, (FASTEST..=3000.0);
+        /// How warm the muscle is at the start of the second of several recordings
+        second: f64 = 0.0, ONE, (0.0..=1.0);
+        /// How warm it is at the start of the third
+        third: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Which of the recordings is simulated
+        recording: f64 = 1.0, ONE, (1.0..=1000.0);
+    }
+}
+
+impl TemperatureDrift {
+    fn warmth(&self, own: &[f64]) -> f64 {
+        own[0] + self.slow_share * (own[1] - own[0])
     }
 }
 
@@ -39,7 +57,7 @@ impl Effect for TemperatureDrift {
     const DESCRIPTION: Description = Description {
         name: "temperature_drift",
         meaning: "slow change of the muscle while it warms up",
-        equation: "tau dw/dt = 1 - k + k |P|/(10 W) - w;  A <- A (1 + a w);  F_e <- F_e (1 + e w)",
+        equation: "tau_i dw_i/dt = 1 - k + k |P|/(10 W) - w_i;  w = (1 - s) w_1 + s w_2;  A <- A (1 + a w);  F_e <- F_e (1 + e w)",
         signature: "force residual that grows from zero and stays: the first cycle differs from the last",
         experiment: "the same cycle for several minutes, from cold",
         reference: "definition",
@@ -54,9 +72,16 @@ impl Effect for TemperatureDrift {
             ],
         ],
         further_forms: &[],
-        refinements: &[("temperature_drift.elastic_change", &[0.05])],
+        refinements: &[
+            ("temperature_drift.elastic_change", &[0.05]),
+            ("temperature_drift.slow_share", &[0.3]),
+            ("temperature_drift.slow_time_constant", &[100.0]),
+            ("temperature_drift.second", &[0.5]),
+            ("temperature_drift.third", &[0.7]),
+        ],
     };
-    const STATE_SCALES: &'static [f64] = &[1.0];
+    /// Both parts of its warmth.
+    const STATE_SCALES: &'static [f64] = &[1.0, 1.0];
 
     fn is_neutral(&self) -> bool {
         self.area_change == 0.0 && self.elastic_change == 0.0
@@ -66,17 +91,31 @@ impl Effect for TemperatureDrift {
         self.time_constant > FASTEST
     }
 
+    fn in_recording(&mut self, number: f64) {
+        self.recording = number;
+    }
+
+    fn start(&self, _at: &Point, own: &mut [f64]) {
+        own.fill(match self.recording {
+            2.0 => self.second,
+            3.0 => self.third,
+            _ => 0.0,
+        });
+    }
+
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let power = (at.pressure_pull * at.contraction_velocity).abs() / REFERENCE_POWER;
-        rates[0] = (1.0 + self.work_share * (power - 1.0) - own[0]) / self.time_constant;
+        let aim = 1.0 + self.work_share * (power - 1.0);
+        rates[0] = (aim - own[0]) / self.time_constant;
+        rates[1] = (aim - own[1]) / self.slow_time_constant;
     }
 
     fn area_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
-        force * (1.0 + self.area_change * own[0])
+        force * (1.0 + self.area_change * self.warmth(own))
     }
 
     fn elastic_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
-        force * (1.0 + self.elastic_change * own[0])
+        force * (1.0 + self.elastic_change * self.warmth(own))
     }
 
     fn sentence(&self) -> String {

@@ -5,7 +5,7 @@ zero! {
     /// A valve whose zero is off.
     ///
     /// # Model
-    /// u ← u + o + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `settling` s,
+    /// u ← u + o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `second` and `third` o_k in recording k, `settling` s,
     /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
     /// `shift_span` around `shift_time`.
     ///
@@ -14,7 +14,8 @@ zero! {
     /// force stays.
     ///
     /// # Validity
-    /// Constant, settling, swinging or shifted once, as the zeros of sensors; in every recording alike, from its start. Where it
+    /// Constant, settling, swinging or shifted once, as the zeros of sensors; in every recording alike, from its start, but for a constant
+    /// that may be another one in each of up to three. Where it
     /// is constant at first and changed in the course of a simulation, t counts from that change.
     ///
     /// # Reference
@@ -29,13 +30,13 @@ impl Effect for ValveOffset {
     const DESCRIPTION: Description = Description {
         name: "valve_offset",
         meaning: "the zero of the valve is off",
-        equation: "u <- u + o + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
+        equation: "u <- u + o + o_k + s exp(-t/tau) + a sin(2 pi t/T + phi) + j clamp((t - t_j)/d + 1/2, 0, 1)",
         signature: "constant residual of the pressure, and of the force with it",
         experiment: "stairs of the command with the pressure recorded by a second sensor",
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[Self::CONSTANT],
+        forms: &[Self::CONSTANT, Self::OF_TWO, Self::OF_THREE],
         further_forms: Self::FURTHER_FORMS,
         refinements: Self::REFINEMENTS,
     };
@@ -47,6 +48,10 @@ impl Effect for ValveOffset {
 
     fn is_plausible(&self) -> bool {
         self.course().is_plausible()
+    }
+
+    fn in_recording(&mut self, number: f64) {
+        self.recording = number;
     }
 
     fn own_course(&self, time: f64) -> f64 {

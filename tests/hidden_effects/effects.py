@@ -35,6 +35,11 @@ class Form:
         """The size for the experiments of a case, where it depends on them; the same in all of them."""
         return size
 
+    @staticmethod
+    def in_recording(size, number):
+        """The size in one of the recordings of a case, counted from 0, where they differ."""
+        return size
+
     def __init__(self, at, size):
         self.at = at
         for name, values in size.items():
@@ -382,6 +387,25 @@ class ValveOffset(Form):
         return command + self.volts
 
 
+def shares(random):
+    """Of an offset in each recording, where it is set anew."""
+    return {"shares": [1.0, *random.uniform(-0.5, 1.5, 2)]}
+
+
+def at_share(size, name, number):
+    return {name: size[name] * size["shares"][number]}
+
+
+class ValveOffsetAnew(ValveOffset):
+    @staticmethod
+    def sizes(random, severity):
+        return {**ValveOffset.sizes(random, severity), **shares(random)}
+
+    @staticmethod
+    def in_recording(size, number):
+        return at_share(size, "volts", number)
+
+
 class WeakSupply(Form):
     """A ceiling within the range of the command, rounded, that droops while filling."""
 
@@ -445,6 +469,16 @@ class PositionOffset(Form):
         return p, x + self.off, force
 
 
+class PositionOffsetAnew(PositionOffset):
+    @staticmethod
+    def sizes(random, severity):
+        return {**PositionOffset.sizes(random, severity), **shares(random)}
+
+    @staticmethod
+    def in_recording(size, number):
+        return at_share(size, "off", number)
+
+
 class PositionGain(Form):
     @staticmethod
     def sizes(random, severity):
@@ -473,6 +507,16 @@ class PressureOffset(Form):
         return p + self.off, x, force
 
 
+class PressureOffsetAnew(PressureOffset):
+    @staticmethod
+    def sizes(random, severity):
+        return {**PressureOffset.sizes(random, severity), **shares(random)}
+
+    @staticmethod
+    def in_recording(size, number):
+        return at_share(size, "off", number)
+
+
 class PressureGain(Form):
     @staticmethod
     def sizes(random, severity):
@@ -489,6 +533,16 @@ class ForceOffset(Form):
 
     def show(self, time, p, x, force):
         return p, x, force + self.off
+
+
+class ForceOffsetAnew(ForceOffset):
+    @staticmethod
+    def sizes(random, severity):
+        return {**ForceOffset.sizes(random, severity), **shares(random)}
+
+    @staticmethod
+    def in_recording(size, number):
+        return at_share(size, "off", number)
 
 
 class ForceSensorGain(Form):
@@ -515,16 +569,16 @@ KNOWN = {
     "valve_dead_time": [DeadTime],
     "valve_dead_band": [Play, Stiction],
     "valve_gain": [ValveGain],
-    "valve_offset": [ValveOffset],
+    "valve_offset": [ValveOffset, ValveOffsetAnew],
     "supply_saturation": [WeakSupply],
     "flow_limit": [ChokedFlow],
     "leakage": [OrificeLeak],
-    "contraction_sensor_offset": [PositionOffset],
+    "contraction_sensor_offset": [PositionOffset, PositionOffsetAnew],
     "contraction_sensor_gain": [PositionGain],
     "contraction_sensor_delay": [PositionDelay],
-    "pressure_sensor_offset": [PressureOffset],
+    "pressure_sensor_offset": [PressureOffset, PressureOffsetAnew],
     "pressure_sensor_gain": [PressureGain],
-    "force_sensor_offset": [ForceOffset],
+    "force_sensor_offset": [ForceOffset, ForceOffsetAnew],
     "force_sensor_gain": [ForceSensorGain],
     "temperature_drift": [WarmUp],
 }

@@ -275,8 +275,9 @@ def draw_case(random, truth, kind):
     bare = [draw_experiment(random, mass, excitation, kind.session.seconds) for mass, excitation in both]
     hidden = tuple((form, form.suited(size, bare)) for form, size in hidden)
     case = Case(effects, kind, hidden, specimen, noise)
-    for experiment, excitation in zip(bare, excitations, strict=True):
-        full = replace(experiment, specimen=specimen, hidden=hidden, relaxed=relaxed)
+    for number, (experiment, excitation) in enumerate(zip(bare, excitations, strict=True)):
+        here = tuple((form, form.in_recording(size, number)) for form, size in hidden)
+        full = replace(experiment, specimen=specimen, hidden=here, relaxed=relaxed)
         case.plans.append(Plan(full, experiment.mass, columns, str(excitation), float(rate), float(jitter)))
     return case
 

@@ -115,6 +115,21 @@ class PullCreep(Plant):
         return super().static_force(pressure, x, own) + 0.2 * (own[0] - self.at_start)
 
 
+class UnevenPullCreep(PullCreep):
+    """It takes three times as long to lose what it gained."""
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        lack = pressure * VIRTUAL_AREA_1000.area(x) - own[0]
+        return [lack / (2.5 if lack > 0 else 7.5)]
+
+
+class KnownPullCreep(UnevenPullCreep):
+    """With coefficients that were identified after all drift."""
+
+    def static_force(self, pressure, x, own):
+        return Plant.static_force(self, pressure, x, own) - 0.2 * (pressure * VIRTUAL_AREA_1000.area(x) - own[0])
+
+
 class Relaxation(Plant):
     """Springs to points that follow the muscle's end as dashpots let them: a standard linear solid of two times."""
 
@@ -128,6 +143,13 @@ class Relaxation(Plant):
 
     def static_force(self, pressure, x, own):
         return super().static_force(pressure, x, own) - 1500.0 * (x - own[0]) - 600.0 * (x - own[1])
+
+
+class ActivatedRelaxation(Relaxation):
+    """Eyring's dashpots, which yield as the hyperbolic sine of their stress."""
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [np.sinh(120 * (x - point)) / 120 / time for point, time in zip(own, (1.5, 8.0), strict=True)]
 
 
 class Resonance(Plant):
@@ -521,7 +543,10 @@ CASES = [
     Case("uneven_creep", UnevenCreep(), STAIRS),
     Case("known_creep", KnownCreep(), STAIRS),
     Case("pull_creep", PullCreep(), STAIRS),
+    Case("uneven_pull_creep", UnevenPullCreep(), STAIRS),
+    Case("known_pull_creep", KnownPullCreep(), STAIRS),
     Case("relaxation", Relaxation(), STAIRS),
+    Case("activated_relaxation", ActivatedRelaxation(), STAIRS),
     Case("regulator", Regulator(), STAIRS),
     Case("slower_when_short", SlowerWhenShort(), STAIRS),
     Case("uneven_dead_time", UnevenDeadTime(), RAMPS),
