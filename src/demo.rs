@@ -2,7 +2,7 @@
 
 use crate::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, diagnose, report};
 use crate::export;
-use crate::measurement::Recording;
+use crate::measurement::{Recording, numbered};
 use crate::package::Library;
 use crate::parameters::Parameters;
 use crate::plot::{Curve, plot};
@@ -40,6 +40,7 @@ pub fn run(folder: &Path, done: &(dyn Fn(&str) + Sync)) -> Result<Demo> {
         .iter()
         .map(|(name, text)| Recording::parse(text, Path::new(name), &[]))
         .collect::<Result<Vec<_>>>()?;
+    let recordings = numbered(recordings);
     let diagnosis = diagnose(&nominal, &recordings, DEFAULT_TOLERANCE, done)?;
     let mut files = diagnosis::report::files(&diagnosis, &nominal, &recordings, &libraries, &folder.join("diagnosis"))?;
     files.push((folder.join("closed_loop.svg"), closed_loop_plot(&closed_loop).into_bytes()));

@@ -39,14 +39,15 @@ impl Replay {
     }
 }
 
-/// Samples whose mean is taken as the pressure at the start, at least; and longest time in s over which it is taken where the
-/// pressure rests.
+/// Samples whose mean is taken as the pressure at the start where it moves; and longest time in s over which it is judged where it
+/// rests.
 const START_SAMPLES: usize = 5;
 const START_SPAN: f64 = 1.0;
-/// How many times as many samples there must be to tell whether it rests, and the standard deviations by which their last quarter
-/// may then differ from the first one: a straight line makes 2.6 of it, an exponential over 15 time constants 1.5.
-const TO_TELL: usize = 4;
-const AT_REST: f64 = 1.2;
+/// Fewest samples that tell whether it rests.
+const TO_TELL: usize = 20;
+/// By how many standard deviations of the second half of these the first samples' mean, and that of the first quarter, may differ from
+/// their level: a straight line makes five, a step before the start more.
+const AT_REST: (f64, f64) = (2.0, 1.0);
 /// Share of its span within which a command is held.
 const HELD: f64 = 1e-3;
 
@@ -54,7 +55,7 @@ const HELD: f64 = 1e-3;
 ///
 /// With a hanging load the input is the command; without, it is the contraction with the command or, where there is
 /// none, with the measured pressure. Measured inputs are what the sensors showed: the effects on the sensors are undone.
-/// The simulation starts at rest at the first measured pressure or, where there is none, at the one that the first
+/// The simulation starts at rest at the first measured pressure, a mean of as many readings as there are at rest, or, where there is none, at the one that the first
 /// command leads to.
 ///
 /// # Errors
@@ -135,10 +136,13 @@ fn replay_pull(parameters: &Parameters, recording: &Recording, tolerance: f64) -
 fn initial_pressure(parameters: &Parameters, recording: &Recording, command: &[f64]) -> f64 {
     match recording.bridged(Signal::GaugePressure) {
         Some(readings) => {
-            let time = &recording.time;
+            let (time, effects) = (&recording.time, &parameters.effects);
             let first = 0..resting(time, command, &readings);
-            let pressures = first.map(|k| parameters.effects.true_pressure(readings[k], time[k] - time[0]));
-            mean(&pressures.collect::<Vec<_>>()).max(0.0)
+            let truth: Vec<f64> = first.map(|k| effects.true_pressure(readings[k], time[k] - time[0])).collect();
+            // Behind a shut valve it may still drift.
+            let since = mean(&time[..truth.len()]) - time[0];
+            let drift = if truth.len() > START_SAMPLES { slope(&time[..truth.len()], &truth) } else { 0.0 };
+            (mean(&truth) - drift * since).max(0.0)
         }
         None => {
             let contraction = recording.bridged(Signal::Contraction).map_or(0.0, |readings| readings[0]);
@@ -148,21 +152,21 @@ fn initial_pressure(parameters: &Parameters, recording: &Recording, command: &[f
 }
 
 /// How many of the first readings show the pressure at the start: as many as there are before the command moves, unless they move
-/// by themselves.
+/// by themselves by more than a slow drift.
 fn resting(time: &[f64], command: &[f64], readings: &[f64]) -> usize {
     let few = START_SAMPLES.min(readings.len());
     let [least, most] = [f64::min, f64::max].map(|of| command.iter().copied().fold(command[0], of));
     let is_held =
         |k: &usize| (command[*k] - command[0]).abs() <= HELD * (most - least) && time[*k] - time[0] <= START_SPAN;
     let held = &readings[..(0..readings.len()).take_while(is_held).count()];
-    if held.len() < TO_TELL * few {
+    if held.len() < TO_TELL {
         return few;
     }
-    let level = mean(held);
-    let variance = held.iter().map(|reading| (reading - level).powi(2)).sum::<f64>() / held.len() as f64;
-    let quarter = held.len() / 4;
-    let moves = (mean(&held[..quarter]) - mean(&held[held.len() - quarter..])).abs() > AT_REST * variance.sqrt();
-    if moves { few } else { held.len() }
+    let (_, late) = held.split_at(held.len() / 2);
+    let level = mean(late);
+    let deviation = (late.iter().map(|reading| (reading - level).powi(2)).sum::<f64>() / late.len() as f64).sqrt();
+    let is_off = |first: usize, most: f64| (mean(&held[..first]) - level).abs() > most * deviation;
+    if is_off(few, AT_REST.0) || is_off(held.len() / 4, AT_REST.1) { few } else { held.len() }
 }
 
 /// A prescribed motion behind the readings of the position sensor.
@@ -437,4 +441,34 @@ pub fn closed_loop_on(plant: &Parameters, known: &Parameters, step: f64, duratio
         }
     }
     Ok(course)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 0.01;
+
+    /// Held for some samples, then rising.
+    fn command(held: usize) -> Vec<f64> {
+        (0..300_usize).map(|k| 2.0 + 0.01 * k.max(held) as f64).collect()
+    }
+
+    fn rests(held: usize, pressure: impl Fn(f64) -> f64) -> usize {
+        let time: Vec<f64> = (0..300).map(|k| PERIOD * f64::from(k)).collect();
+        // Noise of 300 Pa that a sensor of 400 Pa shows.
+        let noise = |k: usize| 400.0 * (0.75 * ((k * k) as f64 * 0.7).sin()).round();
+        let readings: Vec<f64> = time.iter().enumerate().map(|(k, time)| pressure(*time) + noise(k)).collect();
+        resting(&time, &command(held), &readings)
+    }
+
+    #[test]
+    fn the_pressure_at_the_start_is_the_mean_of_all_readings_at_rest() {
+        assert_eq!(rests(60, |_| 2e5), 61);
+        assert_eq!(rests(250, |_| 2e5), 101, "a second at most");
+        assert_eq!(rests(0, |_| 2e5), START_SAMPLES, "the command moves at once");
+        assert_eq!(rests(60, |time| 2e5 + 2e4 * (-time / 0.064).exp()), START_SAMPLES, "the pressure still moves");
+        assert_eq!(rests(120, |time| 2e5 + 2e5 * (-time / 0.025).exp()), START_SAMPLES, "the pressure still moves");
+        assert_eq!(rests(25, |time| 2e5 + 1e5 * time), START_SAMPLES, "the pressure still moves");
+    }
 }

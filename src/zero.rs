@@ -1,5 +1,6 @@
 //! Zeros of sensors and of the valve, which need not stay where they are while one records.
 
+use crate::effects::of_recording;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
@@ -35,7 +36,8 @@ impl Course {
         let (settling, constant) = self.settling;
         let (swing, period, phase) = self.swing;
         let (shift, middle, lasts) = self.shift;
-        let mut zero = self.offset + self.own();
+        let [second, third] = self.anew;
+        let mut zero = self.offset + of_recording(self.recording, [0.0, second, third]);
         if settling != 0.0 {
             zero += settling * (-time / constant).exp();
         }
@@ -46,15 +48,6 @@ impl Course {
             zero += shift * ((time - middle) / lasts + 0.5).clamp(0.0, 1.0);
         }
         zero
-    }
-
-    /// By how much it is higher than in the first recording.
-    fn own(&self) -> f64 {
-        match self.recording {
-            2.0 => self.anew[0],
-            3.0 => self.anew[1],
-            _ => 0.0,
-        }
     }
 
     /// Whether it stays where it is.
@@ -85,7 +78,7 @@ impl Course {
         let shows = |value: f64| amount(value).contains(|digit: char| ('1'..='9').contains(&digit));
         for (own, recording) in self.anew.into_iter().zip(["second", "third"]) {
             if shows(own) {
-                let _ = write!(told, ", {} on top in the {recording} recording", amount(own));
+                let _ = write!(told, ", {} in the {recording} recording", amount(self.offset + own));
             }
         }
         if shows(settling) {
@@ -120,7 +113,7 @@ macro_rules! zero {
                 second: f64 = 0.0, $unit, (-$most..=$most);
                 /// By how much it is higher in the third
                 third: f64 = 0.0, $unit, (-$most..=$most);
-                /// Which of the recordings is simulated
+                /// Which of the recordings is simulated: from the fourth on as the first
                 recording: f64 = 1.0, ONE, (1.0..=1000.0);
                 /// Excess of the offset at the start, which settles
                 settling: f64 = 0.0, $unit, (-$most..=$most);

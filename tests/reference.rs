@@ -173,6 +173,14 @@ fn effects_agree_with_scipy() {
         ),
         ("leakage", &[("leakage.rate", 0.8), ("leakage.choked_share", 0.4), ("leakage.volume_growth", 0.4)]),
         ("tear", &[("leakage.rate", 0.6), ("leakage.opening_with_contraction", 1.5)]),
+        (
+            "crack",
+            &[
+                ("leakage.rate", 0.05),
+                ("leakage.opening_with_contraction", 50.0),
+                ("leakage.opening_contraction", 0.06),
+            ],
+        ),
         ("lifting_seal", &[("leakage.rate", 0.8), ("leakage.opening_pressure", 0.9e5), ("leakage.volume_growth", 0.4)]),
         (
             "small_tank",
@@ -207,6 +215,35 @@ fn effects_agree_with_scipy() {
                 ("temperature_drift.elastic_change", -0.03),
                 ("temperature_drift.time_constant", 4.0),
                 ("temperature_drift.work_share", 1.0),
+            ],
+        ),
+        (
+            // Two lags in a row in partial fractions.
+            "slow_start",
+            &[
+                ("temperature_drift.area_change", 0.05),
+                ("temperature_drift.elastic_change", -0.1),
+                ("temperature_drift.time_constant", 6.0),
+                ("temperature_drift.share_2", -1.0),
+                ("temperature_drift.time_constant_2", 3.0),
+                ("temperature_drift.second", 0.3),
+                ("temperature_drift.recording", 2.0),
+            ],
+        ),
+        (
+            "stiffer_end",
+            &[
+                ("bladder_stiffness.added_force", 40.0),
+                ("bladder_stiffness.added_growth", 0.45),
+                ("bladder_stiffness.added_curvature", 0.3),
+            ],
+        ),
+        (
+            "laid_rope",
+            &[
+                ("series_elasticity.compliance", -5e-6),
+                ("series_elasticity.exponent", 0.0),
+                ("series_elasticity.toe_force", 160.0),
             ],
         ),
         ("wrong_bore", &[("force_gain.relative_error", 0.08), ("force_gain.elastic_share", 0.5)]),

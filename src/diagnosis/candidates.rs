@@ -72,9 +72,9 @@ impl Refined {
         Self(1 << which)
     }
 
-    /// All of an effect.
-    pub const fn fully(effect: &Description) -> Self {
-        Self((1 << effect.refinements.len()) - 1)
+    /// Each of these alone.
+    pub fn each(self) -> impl Iterator<Item = Self> {
+        (0..u32::BITS as usize).filter(move |which| self.has(*which)).map(Self::by)
     }
 
     const fn has(self, which: usize) -> bool {
@@ -485,13 +485,30 @@ impl<'a> Bench<'a> {
     /// How promising is judged from one simulation: how much of the weighted squares of the residuals goes away when the
     /// change that the effect makes is scaled and the corrections and the parameters so far adapt, to first order.
     pub fn starts(&self, base: &Fitted, effect: &'static Description) -> Vec<Start> {
-        let forms = (0..effect.forms.len()).flat_map(|form| {
-            let part = Part { effect, form, refined: Refined::NOT };
-            (0..part.starts()).map(move |choice| (part, choice))
-        });
+        let forms = self.forms(effect).filter(|part| !part.is_rare());
+        let forms = forms.flat_map(|part| (0..part.starts()).map(move |choice| (part, choice)));
         let mut starts: Vec<Start> = forms.filter_map(|(part, choice)| self.start(base, part, choice)).collect();
         starts.sort_by(|a, b| b.promise.total_cmp(&a.promise));
         starts
+    }
+
+    /// The forms of an effect that mean something here, rare ones among them, without refinements.
+    pub fn forms(&self, effect: &'static Description) -> impl Iterator<Item = Part> {
+        let forms = effect.all_forms().enumerate();
+        let possible = forms.filter(|(_, form)| form.iter().all(|freed| self.means_something(freed)));
+        possible.map(move |(form, _)| Part { effect, form, refined: Refined::NOT })
+    }
+
+    /// All refinements of an effect that mean something here.
+    pub fn fully(&self, effect: &Description) -> Refined {
+        let refinements = effect.refinements.iter().enumerate().filter(|(_, freed)| self.means_something(freed));
+        Refined(refinements.map(|(which, _)| Refined::by(which).0).sum())
+    }
+
+    /// Whether there are as many recordings as a parameter is for.
+    fn means_something(&self, (name, _): &Freed) -> bool {
+        let recordings = self.data.recordings().len();
+        !(name.ends_with(".second") && recordings < 2 || name.ends_with(".third") && recordings < 3)
     }
 
     /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.

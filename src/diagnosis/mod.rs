@@ -26,7 +26,7 @@ use crate::quality;
 use crate::simulation::replay;
 use crate::variables::Declared;
 use crate::{Error, Result};
-use candidates::{Bench, Fitted, Off};
+use candidates::{Bench, Fitted, Off, Part};
 use residuals::Data;
 use residuals::Scope;
 use selection::{Chosen, Judged, Search};
@@ -140,7 +140,8 @@ pub struct Diagnosis {
 /// Diagnoses recordings against a nominal model.
 ///
 /// `tolerance` is the relative error of the nominal coefficients below which nothing is called wrong; `done` is told
-/// after each of the `1 + candidates` fits, of which there may be two rounds, the second perhaps without its candidates.
+/// after each of the `1 + candidates` fits, of which there may be two rounds, the second perhaps without its candidates. What is set
+/// anew in each recording is found where these are [`numbered`](crate::measurement::numbered).
 ///
 /// # Errors
 /// [`Error::Recording`] where nothing can be compared; errors of the simulation of the nominal model.
@@ -218,6 +219,7 @@ fn answer(
     data.refine_noise(&left);
     let seen = if chosen.saw_all { Scope::All } else { Scope::Training };
     let (parameters, corrections) = bench.intervals(&chosen.model, seen);
+    notes.extend(of_several(chosen, data.recordings()));
     let nominal_errors = data.held_out_rms(&nominal_residuals);
     let mut extended = chosen.model.parameters;
     let mut extended_errors = data.held_out_rms(&left);
@@ -257,6 +259,18 @@ fn answer(
         notes,
         remaining: remaining::remaining(&data, &extended, &left),
     })
+}
+
+/// How to simulate another recording than the first with causes that have values of their own there.
+fn of_several(chosen: &Chosen, recordings: &[Recording]) -> Option<String> {
+    let differ = |part: &&Part| part.freed().any(|(name, _)| name.ends_with(".second") || name.ends_with(".third"));
+    let numbers = chosen.model.hypothesis.parts.iter().filter(differ);
+    let numbers: Vec<_> = numbers.map(|part| format!("`{}.recording`", part.effect.name)).collect();
+    let names: Vec<_> =
+        recordings.iter().enumerate().map(|(index, r)| format!("{} for {}", index + 1, r.name())).collect();
+    let text =
+        format!("{} says which recording the extended model is for: {}", numbers.join(" and "), names.join(", "));
+    (!numbers.is_empty()).then_some(text)
 }
 
 /// The causes as they are told, the largest first.

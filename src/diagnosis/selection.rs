@@ -64,6 +64,8 @@ const AS_PROMISING: f64 = 0.98;
 /// Starts from which a candidate is fitted, and the share of the first one's promise that a further one must have.
 const STARTS: usize = 2;
 const ALSO_PROMISING: f64 = 0.5;
+/// Share of the squares in which starts of a form differ that are not the same one scaled.
+const SAME_PROMISE: f64 = 1e-4;
 
 /// A hypothesis with what speaks for it.
 #[derive(Clone)]
@@ -288,7 +290,7 @@ impl<'a, 'b> Search<'a, 'b> {
         starts.truncate(equal.clamp(most, 2 * most));
         let best = |starts: Vec<Start>| {
             let also = ALSO_PROMISING * starts[0].promise;
-            let fits = starts.iter().take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
+            let fits = distinct(&starts).take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
                 Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &start.parameters)?))
             });
             fits.max_by(|a, b| a.score.total_cmp(&b.score))
@@ -298,19 +300,21 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The same, refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
     /// best with all of its effects, those that are carried on or may rival it with their last. Where the best leaves no more
-    /// than forms may, only its possible rivals are, with all of theirs; other forms are worth the time to single effects.
+    /// than forms may, only its possible rivals are, with all of theirs; other forms are worth the time to single effects, also where the
+    /// best explains enough to be the only cause.
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         let mut others = judged.into_iter().enumerate();
         let Some(best) = others.next().map(|(_, best)| self.in_best_form(best)) else { return Vec::new() };
         let may_be_form = self.may_be_form(&best.fitted.losses);
+        let explains = best.explained > LEAST_EXPLAINED.0;
         let is_close = |(rank, _): &(usize, Judged)| rivals.contains(rank) || !may_be_form && ranks.contains(rank);
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
         let refined = close.into_par_iter().map(|(_, judged)| match judged.fitted.hypothesis.parts.len() {
-            1 if may_be_form => self.in_best_form(judged),
-            _ if may_be_form => self.finished(self.refined(judged)),
-            parts => self.finished(self.part_refined(judged, parts - 1)),
+            1 if may_be_form || explains => self.in_best_form(judged),
+            _ if may_be_form => self.finished_refined(judged, |judged| self.refined(judged)),
+            parts => self.finished_refined(judged, |judged| self.part_refined(judged, parts - 1)),
         });
         sorted(refined.chain([best]).chain(rest).collect())
     }
@@ -322,10 +326,16 @@ impl<'a, 'b> Search<'a, 'b> {
             .map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
+    /// A hypothesis refined and fitted to the end; as it is where its refinements would end where its causes cannot be.
+    fn finished_refined(&self, judged: Judged, refine: impl Fn(Judged) -> Judged) -> Judged {
+        let refined = self.finished(refine(judged.clone()));
+        if is_possible(&refined) || !is_possible(&judged) { refined } else { self.finished(judged) }
+    }
+
     /// A hypothesis refined in all its effects and, where something is left then, further refined, and in the best form of its
     /// last.
     fn in_best_form(&self, judged: Judged) -> Judged {
-        let refined = self.finished(self.refined(judged.clone()));
+        let refined = self.finished_refined(judged.clone(), |judged| self.refined(judged));
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;
         }
@@ -334,9 +344,9 @@ impl<'a, 'b> Search<'a, 'b> {
             .hypothesis
             .parts
             .iter()
-            .any(|part| ![Refined::NOT, Refined::fully(part.effect)].contains(&part.refined));
-        let further = partly.then(|| self.finished(self.refined(refined.clone())));
-        let other = self.in_other_forms(&judged).map(|other| self.finished(self.refined(other)));
+            .any(|part| ![Refined::NOT, self.bench.fully(part.effect)].contains(&part.refined));
+        let further = partly.then(|| self.finished_refined(refined.clone(), |judged| self.refined(judged)));
+        let other = self.in_other_forms(&judged).map(|other| self.finished_refined(other, |other| self.refined(other)));
         let all = further.into_iter().chain(other).chain([refined.clone()]);
         all.max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
     }
@@ -345,9 +355,8 @@ impl<'a, 'b> Search<'a, 'b> {
     fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
         let last = judged.fitted.hypothesis.parts.last()?;
         let others =
-            (0..last.effect.all_forms().count()).filter(|form| *form != last.form).collect::<Vec<_>>().into_par_iter();
-        let fits = others.filter_map(|form| {
-            let part = Part { form, refined: Refined::NOT, ..*last };
+            self.bench.forms(last.effect).filter(|part| part.form != last.form).collect::<Vec<_>>().into_par_iter();
+        let fits = others.filter_map(|part| {
             let start = self.bench.best_start(&judged.fitted.parameters, *last, part)?;
             let hypothesis = judged.fitted.hypothesis.without(last.effect.name).with(part);
             let fitted = self.bench.rough_fit(&hypothesis, &start)?;
@@ -375,9 +384,9 @@ impl<'a, 'b> Search<'a, 'b> {
         if part.is_rare() {
             return judged;
         }
-        let fully = Refined::fully(part.effect);
+        let fully = self.bench.fully(part.effect);
         let ways: Vec<_> = if part.refined == Refined::NOT {
-            [Refined::NOT, fully].into_iter().chain((0..part.effect.refinements.len()).map(Refined::by)).collect()
+            [Refined::NOT, fully].into_iter().chain(fully.each()).collect()
         } else if part.refined == fully {
             return judged;
         } else {
@@ -564,18 +573,12 @@ impl<'a, 'b> Search<'a, 'b> {
         if best.explained < least_explained(&best.fitted).0 {
             return refused(wrong);
         }
-        let told = self.simplest(&best);
-        let size = told.fitted.hypothesis.size();
-        let told = self.without_idle(told);
-        let model = self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, Scope::Training)?;
-        if model.hypothesis.is_impossible(&model.parameters) {
-            return refused(wrong);
-        }
-        let holds_out = self.holds(&model)? && !self.bench.shows_late(&model);
-        if !(holds_out || self.is_as_good_in_training(&told.fitted, &model) && self.holds(&told.fitted)?) {
-            return refused(wrong);
-        }
-        let model = if holds_out { model } else { told.fitted };
+        let plain = self.simplest(&best);
+        let size = plain.fitted.hypothesis.size();
+        let told = self.without_idle(plain.clone());
+        let are_idle = told.fitted.hypothesis.size() < size;
+        let foretold = self.foretelling(told).or_else(|| if are_idle { self.foretelling(plain) } else { None });
+        let Some((model, holds_out)) = foretold else { return refused(wrong) };
         let of_as_many = levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
         let rivals = self.rivals(&best, size, of_as_many.map_or(&[], |level| level));
         let alternatives: Vec<Vec<&'static str>> =
@@ -589,6 +592,20 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
         Some(Chosen { verdict, model, left: best.fitted.losses, saw_all: !holds_out, alternatives, rivals, singles })
+    }
+
+    /// A hypothesis fitted to the samples that fits may see, and whether it foretells the others; or, where these tell too little,
+    /// as it was fitted to all. `None` where neither will do.
+    fn foretelling(&self, told: Judged) -> Option<(Fitted, bool)> {
+        let model = self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, Scope::Training)?;
+        if model.hypothesis.is_impossible(&model.parameters) {
+            return None;
+        }
+        if self.holds(&model)? && !self.bench.shows_late(&model) {
+            return Some((model, true));
+        }
+        let holds = self.is_as_good_in_training(&told.fitted, &model) && self.holds(&told.fitted)?;
+        holds.then_some((told.fitted, false))
     }
 
     /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
@@ -611,14 +628,15 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         let neutral = Parameters::default();
         let (own, _) = self.bench.intervals(&judged.fitted, Scope::All);
-        let doubt = |own: &FittedParameter| {
-            let away = (own.value - declared(&neutral, own.name).1).abs();
-            away / (own.high - own.value).max(own.value - own.low).max(f64::MIN_POSITIVE)
-        };
+        let neutral = |own: &FittedParameter| declared(&neutral, own.name).1;
         let parts = &judged.fitted.hypothesis.parts;
         let is_refinement =
             |own: &&FittedParameter| parts.iter().any(|part| part.refinements().any(|(name, _)| *name == own.name));
-        let mut idle: Vec<&FittedParameter> = own.iter().filter(is_refinement).filter(|own| doubt(own) < 1.0).collect();
+        let may_be_neutral = |own: &&FittedParameter| (own.low..=own.high).contains(&neutral(own));
+        let mut idle: Vec<&FittedParameter> = own.iter().filter(is_refinement).filter(may_be_neutral).collect();
+        // In its interval, the ones that are nearest to neutral first.
+        let doubt =
+            |own: &FittedParameter| (own.value - neutral(own)).abs() / (own.high - own.low).max(f64::MIN_POSITIVE);
         idle.sort_by(|a, b| doubt(a).total_cmp(&doubt(b)));
         let ways = [&idle[..], &idle[..idle.len().min(1)]];
         let fewer = ways.into_iter().filter(|idle| !idle.is_empty()).find_map(|idle| self.spared(&judged, idle));
@@ -635,7 +653,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let fewer = self.judge(self.bench.exact_fit(&hypothesis, &start, Scope::All)?);
         let [likelihood, without] =
             [judged, &fewer].map(|judged| self.bench.data.log_likelihood(&judged.fitted.losses));
-        (likelihood - without <= SPARED * idle.len() as f64).then_some(fewer)
+        (is_possible(&fewer) && likelihood - without <= SPARED * idle.len() as f64).then_some(fewer)
     }
 
     /// Whether the first samples cannot tell a fit from their own best.
@@ -657,7 +675,7 @@ impl<'a, 'b> Search<'a, 'b> {
         Some(gain(&without, &with) > 0.0 && explained > least_explained(trained).1)
     }
 
-    /// Hypotheses that explain the data as well as the best, which is told with `size` parameters: all that the odds allow, or else
+    /// Hypotheses that explain the data as well as the best, which can be told with `size` parameters: all that the odds allow, or else
     /// the one whose forms may be why it is not the best.
     fn rivals<'l>(&self, best: &Judged, size: usize, level: &'l [Judged]) -> Vec<&'l Judged> {
         let possible = level.iter().filter(|other| !same_effects(other, best) && is_possible(other));
@@ -711,6 +729,16 @@ fn first_of_each(judged: impl Iterator<Item = Judged>) -> Vec<Judged> {
         }
     }
     once
+}
+
+/// Starts of an effect, those left out that promise the same in the same form: the other way round, or so much larger.
+fn distinct(starts: &[Start]) -> impl Iterator<Item = &Start> {
+    let same = |a: &Start, b: &Start| a.part.form == b.part.form && (a.promise - b.promise).abs() < SAME_PROMISE;
+    starts
+        .iter()
+        .enumerate()
+        .filter(move |(k, start)| !starts[..*k].iter().any(|known| same(known, start)))
+        .map(|(_, s)| s)
 }
 
 /// From where each effect is best fitted.

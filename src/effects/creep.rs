@@ -58,7 +58,7 @@ crate::variables::variables! {
 
 /// Times in s from which on something gives way slowly; before, it is viscous.
 const SLOW: f64 = 0.2;
-/// Argument beyond which a hyperbolic sine is cut off: flow is then a thousand times faster than any signal.
+/// Argument beyond which flow grows no more, 6800 times as fast as a linear dashpot's: an integration can still follow it.
 const LARGEST_SINH: f64 = 12.0;
 /// Drift per contraction of a membrane that would push ahead of its load for good.
 const AHEAD: f64 = -0.5;
@@ -125,7 +125,7 @@ impl Effect for Creep {
 
     // The second element may be a small part of the whole, and fast.
     fn is_plausible(&self) -> bool {
-        self.time_1 > SLOW && self.amplitude_1 > AHEAD && self.amplitude_2 > AHEAD
+        self.time_1 > SLOW && [self.amplitude_1, self.amplitude_2, self.pull_amplitude].iter().all(|a| *a > AHEAD)
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {
@@ -185,9 +185,10 @@ impl Effect for Creep {
         if self.pull_amplitude != 0.0 {
             all.push(format!("the pull of the pressure grows by {}", one(self.pull_amplitude, self.time_1)));
         }
+        let readily = if self.activation == 0.0 { "" } else { ", the more readily the further it is stretched" };
         for (stiffness, time) in [(self.relaxing_stiffness_1, self.time_1), (self.relaxing_stiffness_2, self.time_2)] {
             if stiffness != 0.0 {
-                all.push(format!("a stiffness of {:.2} N/mm relaxes within {time:.1} s", 1e-3 * stiffness));
+                all.push(format!("a stiffness of {:.2} N/mm relaxes within {time:.1} s{readily}", 1e-3 * stiffness));
             }
         }
         format!("The membrane creeps: {}.", all.join(", and "))

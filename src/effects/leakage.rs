@@ -4,6 +4,8 @@ use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point, REFERENCE_CONTR
 const CRITICAL_RATIO: f64 = 0.3;
 /// Pressure in Pa above the opening at which a porous wall leaks alike whatever its exponent.
 const REFERENCE_PRESSURE: f64 = 2e5;
+/// Contraction in m at which what a muscle loses is told beside that at its rest length.
+const TOLD_CONTRACTION: f64 = 0.15;
 /// Gauge pressure in Pa over which the last of the flow through a hole fades; not physical, it keeps the slope finite.
 const FADE: f64 = 500.0;
 
@@ -39,7 +41,7 @@ crate::variables::variables! {
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
         /// Relative growth of the hole per 0.1 m of contraction
-        opening_with_contraction: f64 = 0.0, ONE, (0.0..=1e3);
+        opening_with_contraction: f64 = 0.0, ONE, (0.0..=100.0);
         /// Contraction from which on the hole grows
         opening_contraction: f64 = 0.0, METRE, (0.0..=0.3);
     }
@@ -64,6 +66,14 @@ impl Leakage {
             return porous;
         }
         (1.0 - self.choked_share) * porous + self.choked_share * hole(gauge_pressure)
+    }
+
+    /// What is lost in Pa/s at a gauge pressure in Pa and a contraction in m.
+    fn loss(&self, gauge_pressure: f64, contraction: f64) -> f64 {
+        let opened = (contraction - self.opening_contraction).max(0.0) / REFERENCE_CONTRACTION;
+        let opening = 1.0 + self.opening_with_contraction * opened;
+        let volume = (1.0 + self.volume_growth * contraction / REFERENCE_CONTRACTION).max(0.1);
+        self.rate * self.flow(gauge_pressure) * opening / volume
     }
 }
 
@@ -102,25 +112,23 @@ impl Effect for Leakage {
     }
 
     fn pressure_rate(&self, at: &Point, _own: &[f64], rate: f64) -> f64 {
-        if self.is_neutral() {
-            return rate;
-        }
-        let pressure = at.gauge_pressure.max(0.0);
-        let opened = (at.contraction - self.opening_contraction).max(0.0) / REFERENCE_CONTRACTION;
-        let opening = 1.0 + self.opening_with_contraction * opened;
-        let volume = (1.0 + self.volume_growth * at.relative_contraction()).max(0.1);
-        rate - self.rate * self.flow(pressure) * opening / volume
+        if self.is_neutral() { rate } else { rate - self.loss(at.gauge_pressure.max(0.0), at.contraction) }
     }
 
     fn sentence(&self) -> String {
-        let at_two_bar = self.rate * self.flow(REFERENCE_PRESSURE);
-        let told = match at_two_bar {
+        let told = |loss: f64| match loss {
             large if large >= 1e3 => format!("{:.2} bar", large * 1e-5),
             small if small >= 10.0 => format!("{:.1} mbar", small * 1e-2),
             tiny => format!("{tiny:.2} Pa"),
         };
-        let length =
-            if self.opening_with_contraction > 0.0 || self.volume_growth > 0.0 { " and its rest length" } else { "" };
-        format!("The muscle leaks: at 2 bar{length} it loses {told} per second.")
+        let at_rest_length = told(self.loss(REFERENCE_PRESSURE, 0.0));
+        if self.opening_with_contraction == 0.0 && self.volume_growth == 0.0 {
+            return format!("The muscle leaks: at 2 bar it loses {at_rest_length} per second.");
+        }
+        let contracted = told(self.loss(REFERENCE_PRESSURE, TOLD_CONTRACTION));
+        format!(
+            "The muscle leaks: at 2 bar it loses {at_rest_length} per second at its rest length and {contracted} at {:.0} cm of contraction.",
+            100.0 * TOLD_CONTRACTION
+        )
     }
 }

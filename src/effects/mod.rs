@@ -57,6 +57,16 @@ fn unscaled(reading: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
     2.0 * reading / (slope + (slope * slope + 4.0 * bend / middle * reading).max(0.0).sqrt())
 }
 
+/// A value that may be another one in each of three recordings, in the one with a number from 1; in further ones it is the first.
+pub(crate) fn of_recording(number: f64, values: [f64; 3]) -> f64 {
+    let [first, second, third] = values;
+    match number.round() {
+        2.0 => second,
+        3.0 => third,
+        _ => first,
+    }
+}
+
 /// What the sensors show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readings {

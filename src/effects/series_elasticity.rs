@@ -34,6 +34,9 @@ crate::variables::variables! {
 
 /// Smallest power without a toe: the stiffness of less is that of a wall.
 const LEAST_EXPONENT: f64 = 0.3;
+/// Pull in N below which a toe is none, and the one that makes up for a smaller power.
+const LEAST_TOE: f64 = 1e-3;
+const OWN_TOE: f64 = 10.0;
 
 impl SeriesElasticity {
     /// Way in m that gives way at a pull in N, for a compliance in m/N.
@@ -46,7 +49,7 @@ impl SeriesElasticity {
 
     /// Way at a pull in N, relative to that at the reference.
     fn course(&self, force: f64) -> f64 {
-        if self.toe_force == 0.0 {
+        if self.toe_force < LEAST_TOE {
             return (force / REFERENCE_FORCE).powf(self.exponent.max(LEAST_EXPONENT));
         }
         // Nearer to zero the differences are those of rounding.
@@ -76,6 +79,10 @@ impl Effect for SeriesElasticity {
 
     fn is_neutral(&self) -> bool {
         self.compliance == 0.0 && self.load_compliance == 0.0
+    }
+
+    fn is_plausible(&self) -> bool {
+        self.exponent > LEAST_EXPONENT || self.toe_force > OWN_TOE
     }
 
     fn stretch(&self, force: f64) -> f64 {

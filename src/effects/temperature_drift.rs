@@ -1,8 +1,11 @@
-use super::{Description, Effect, Holds, Point};
+use super::{Description, Effect, Holds, Point, of_recording};
+use std::fmt::Write;
 
 /// Power in W of the motion for which changes by work are stated.
 const REFERENCE_POWER: f64 = 10.0;
 
+/// How far warmth may begin the wrong way: two exponentials are only nearly what begins slowly.
+const MOST_ASTRAY: f64 = 0.1;
 /// Time constant in s within which no muscle warms up.
 const FASTEST: f64 = 3.0;
 
@@ -11,9 +14,9 @@ crate::variables::variables! {
     ///
     /// # Model
     /// τ₁ dw₁/dt = 1 − k + k |P|/(10 W) − w₁, and w₂ alike with τ₂; P = F_p dx/dt the power of the pressure's pull F_p without effects. With
-    /// w = (1 − s) w₁ + s w₂ the area counts 1 + a w times, the elastic force 1 + e w times: `time_constant` τ₁, `slow_time_constant` τ₂,
-    /// `slow_share` s, `work_share` k, `area_change` a, `elastic_change` e. Heat that spreads begins sooner and ends later than one
-    /// exponential; heat that first has to come through something begins slowly, s < 0. At the start w₁ = w₂ = 0, but for a second and a third
+    /// w = (1 − s) w₁ + s w₂ the area counts 1 + a w times, the elastic force 1 + e w times: `time_constant` τ₁, `time_constant_2` τ₂,
+    /// `share_2` s, `work_share` k, `area_change` a, `elastic_change` e. Heat that spreads begins sooner and ends later than one
+    /// exponential, 0 < s < 1; heat that first has to come through something begins slowly, s < 0 with τ₂ < τ₁. At the start w₁ = w₂ = 0, but for a second and a third
     /// recording that begin warm, `second` and `third`.
     ///
     /// # In the data
@@ -35,21 +38,36 @@ crate::variables::variables! {
         /// Share of the warming that goes with the power of its motion, stated for 10 W
         work_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Share of the warming that has another time constant
-        slow_share: f64 = 0.0, ONE, (-3.0..=1.0);
+        share_2: f64 = 0.0, ONE, (-2.0..=1.0);
         /// That time constant
-        slow_time_constant: f64 = 60.0, SECOND, (FASTEST..=3000.0);
+        time_constant_2: f64 = 60.0, SECOND, (FASTEST..=3000.0);
         /// How warm the muscle is at the start of the second of several recordings
         second: f64 = 0.0, ONE, (0.0..=1.0);
         /// How warm it is at the start of the third
         third: f64 = 0.0, ONE, (0.0..=1.0);
-        /// Which of the recordings is simulated
+        /// Which of the recordings is simulated: from the fourth on as the first
         recording: f64 = 1.0, ONE, (1.0..=1000.0);
     }
 }
 
 impl TemperatureDrift {
+    /// The least warmth on the way from cold to warm, by which it begins the wrong way; 0 where it does not.
+    fn deepest(&self) -> f64 {
+        let (share, one, other) = (self.share_2, self.time_constant, self.time_constant_2);
+        // Its rate (1 − s)/τ₁ exp(−t/τ₁) + s/τ₂ exp(−t/τ₂) is zero where the ratio of the parts is one.
+        let ratio = (1.0 - share) * other / (-share * one);
+        if share >= 0.0 || other < one && ratio >= 1.0 {
+            return 0.0;
+        }
+        if other >= one {
+            return f64::NEG_INFINITY; // it ends the wrong way
+        }
+        let turns = -ratio.ln() / (1.0 / other - 1.0 / one);
+        1.0 - (1.0 - share) * (-turns / one).exp() - share * (-turns / other).exp()
+    }
+
     fn warmth(&self, own: &[f64]) -> f64 {
-        own[0] + self.slow_share * (own[1] - own[0])
+        own[0] + self.share_2 * (own[1] - own[0])
     }
 }
 
@@ -74,8 +92,8 @@ impl Effect for TemperatureDrift {
         further_forms: &[],
         refinements: &[
             ("temperature_drift.elastic_change", &[0.05]),
-            ("temperature_drift.slow_share", &[0.3]),
-            ("temperature_drift.slow_time_constant", &[100.0]),
+            ("temperature_drift.share_2", &[0.3]),
+            ("temperature_drift.time_constant_2", &[100.0]),
             ("temperature_drift.second", &[0.5]),
             ("temperature_drift.third", &[0.7]),
         ],
@@ -88,7 +106,7 @@ impl Effect for TemperatureDrift {
     }
 
     fn is_plausible(&self) -> bool {
-        self.time_constant > FASTEST
+        self.time_constant > FASTEST && self.deepest() > -MOST_ASTRAY
     }
 
     fn in_recording(&mut self, number: f64) {
@@ -96,18 +114,14 @@ impl Effect for TemperatureDrift {
     }
 
     fn start(&self, _at: &Point, own: &mut [f64]) {
-        own.fill(match self.recording {
-            2.0 => self.second,
-            3.0 => self.third,
-            _ => 0.0,
-        });
+        own.fill(of_recording(self.recording, [0.0, self.second, self.third]));
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let power = (at.pressure_pull * at.contraction_velocity).abs() / REFERENCE_POWER;
         let aim = 1.0 + self.work_share * (power - 1.0);
         rates[0] = (aim - own[0]) / self.time_constant;
-        rates[1] = (aim - own[1]) / self.slow_time_constant;
+        rates[1] = (aim - own[1]) / self.time_constant_2;
     }
 
     fn area_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
@@ -123,11 +137,22 @@ impl Effect for TemperatureDrift {
             0.0 => String::new(),
             share => format!(", {share:.0} % of it by its own work, told for 10 W"),
         };
-        format!(
-            "The muscle changes as it warms up within {:.0} s{by_work}: its area by {:+.1} %, its elastic force by {:+.1} %.",
+        let slowly = match 100.0 * self.share_2 {
+            0.0 => String::new(),
+            share if share < 0.0 => format!(" and, slowly at first, within {:.0} s", self.time_constant_2),
+            share => format!(", {share:.0} % of it within {:.0} s", self.time_constant_2),
+        };
+        let mut told = format!(
+            "The muscle changes as it warms up within {:.0} s{slowly}{by_work}: its area by {:+.1} %, its elastic force by {:+.1} %",
             self.time_constant,
             100.0 * self.area_change,
             100.0 * self.elastic_change
-        )
+        );
+        for (warm, recording) in [(self.second, "second"), (self.third, "third")] {
+            if warm > 0.0 {
+                let _ = write!(told, "; the {recording} recording starts {:.0} % warm", 100.0 * warm);
+            }
+        }
+        told + "."
     }
 }

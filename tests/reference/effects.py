@@ -395,6 +395,13 @@ class Tear(Plant):
         return VALVE_BANDWIDTH * (target - pressure) - (0.6 + 9 * x) * pressure
 
 
+class Crack(Plant):
+    """It opens beyond 60 mm of contraction."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        return VALVE_BANDWIDTH * (target - pressure) - (0.05 + 25 * max(x - 0.06, 0.0)) * pressure
+
+
 class LiftingSeal(Plant):
     """Tight up to 0.9 bar."""
 
@@ -459,6 +466,27 @@ class WarmByWork(Plant):
         return (1 + 0.02 * own[0]) * pull + (1 - 0.03 * own[0]) * membrane
 
 
+class SlowStart(Plant):
+    """Two lags in a row, 30 % of both over at the start."""
+
+    own_scales = 0.1, 0.1
+
+    def own_start(self, x):
+        return [0.3, 0.3]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(1 - own[0]) / 6.0, (own[0] - own[1]) / 3.0]
+
+    def static_force(self, pressure, x, own):
+        pull, membrane = pressure * VIRTUAL_AREA_1000.area(x), VIRTUAL_AREA_1000.elastic_force(x)
+        return (1 + 0.05 * own[1]) * pull + (1 - 0.1 * own[1]) * membrane
+
+
+class StifferEnd(Plant):
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x, own) - 340 * x + 600 * x**2 - 12000 * x**3
+
+
 class WrongBore(Plant):
     """8 % stronger threads, 4 % more membrane."""
 
@@ -484,6 +512,11 @@ class Counterweight(Plant):
 class SeriesElasticity(Plant):
     def readings(self, x, force, own):
         return x - 8e-6 * 400 * (force / 400) ** 0.85
+
+
+class LaidRope(Plant):
+    def readings(self, x, force, own):
+        return x - 2e-3 * np.log1p(force / 160) / np.log1p(400 / 160)
 
 
 class Threshold(Plant):
@@ -566,15 +599,19 @@ CASES = [
     Case("nozzle", Nozzle(), STAIRS),
     Case("leakage", Leakage(), STAIRS),
     Case("tear", Tear(), STAIRS),
+    Case("crack", Crack(), STAIRS),
     Case("lifting_seal", LiftingSeal(), STAIRS),
     Case("small_tank", SmallTank(), STAIRS),
     Case("swinging_zero", SwingingZero(), STAIRS),
     Case("shifting_zero", ShiftingZero(), STAIRS),
     Case("warm_by_work", WarmByWork(), STAIRS),
+    Case("stiffer_end", StifferEnd(), STAIRS),
+    Case("slow_start", SlowStart(), STAIRS),
     Case("wrong_bore", WrongBore(), STAIRS),
     Case("stiff_ends", StiffEnds(), STAIRS),
     Case("counterweight", Counterweight(), STAIRS),
     Case("series_elasticity", SeriesElasticity(), RAMPS),
+    Case("laid_rope", LaidRope(), RAMPS),
     Case("threshold", Threshold(), STAIRS),
     Case("friction", Friction(), RAMPS),
     Case("direct_friction", DirectFriction(), RAMPS),
