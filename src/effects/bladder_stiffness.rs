@@ -1,7 +1,6 @@
 use super::{Description, Effect, Holds, Point};
 
-/// Beyond these it is no membrane that changes: a stop, or something else that begins at some contraction.
-const MOST_CHANGE: f64 = 0.9;
+/// Beyond these it is no tube of rubber that adds its force: a stop, or something else that begins at some contraction.
 const LEAST_GROWTH: f64 = -0.5;
 const MOST_GROWTH: f64 = 1.5;
 const MOST_CURVATURE: f64 = 1.0;
@@ -27,7 +26,7 @@ crate::variables::variables! {
         /// Relative change of the elastic force
         relative_change: f64 = 0.0, ONE, (-0.9..=1.0);
         /// Further relative change at 0.1 m of contraction
-        change_with_contraction: f64 = 0.0, ONE, (-MOST_CHANGE..=MOST_CHANGE);
+        change_with_contraction: f64 = 0.0, ONE, (-0.9..=0.9);
         /// Force beside the nominal one with which the membrane pulls back at 0.1 m of contraction
         added_force: f64 = 0.0, NEWTON, (-500.0..=500.0);
         /// Relative growth of its stiffness from 0.1 m to 0.2 m
@@ -66,10 +65,8 @@ impl Effect for BladderStiffness {
     }
 
     fn is_plausible(&self) -> bool {
-        self.change_with_contraction.abs() < MOST_CHANGE
-            && LEAST_GROWTH < self.added_growth
-            && self.added_growth < MOST_GROWTH
-            && self.added_curvature.abs() < MOST_CURVATURE
+        let grows_as_rubber = LEAST_GROWTH < self.added_growth && self.added_growth < MOST_GROWTH;
+        grows_as_rubber && self.added_curvature.abs() < MOST_CURVATURE
     }
 
     fn elastic_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
