@@ -55,8 +55,8 @@ const HELD: f64 = 1e-3;
 ///
 /// With a hanging load the input is the command; without, it is the contraction with the command or, where there is
 /// none, with the measured pressure. Measured inputs are what the sensors showed: the effects on the sensors are undone.
-/// The simulation starts at rest at the first measured pressure, a mean of as many readings as there are at rest, or, where there is none, at the one that the first
-/// command leads to.
+/// The simulation starts at rest at the first measured pressure, by all readings before the command moves, or, where there is none,
+/// at the one that the first command leads to.
 ///
 /// # Errors
 /// [`crate::Error::NoEquilibrium`], [`crate::Error::Diverged`].

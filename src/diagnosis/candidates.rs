@@ -72,6 +72,12 @@ impl Refined {
         Self(1 << which)
     }
 
+    /// Those of an effect whose position and parameter are wanted.
+    fn those(effect: &Description, is_wanted: impl Fn(usize, &str) -> bool) -> Self {
+        let every = effect.refinements.iter().enumerate();
+        Self(every.filter(|(which, (name, _))| is_wanted(*which, name)).map(|(which, _)| Self::by(which).0).sum())
+    }
+
     /// Each of these alone.
     pub fn each(self) -> impl Iterator<Item = Self> {
         (0..u32::BITS as usize).filter(move |which| self.has(*which)).map(Self::by)
@@ -122,14 +128,12 @@ impl Part {
     }
 
     /// With only those of its refinements whose parameters are wanted.
-    pub fn refined_as(self, is_wanted: impl Fn(&str) -> bool) -> Self {
-        let every = self.effect.refinements.iter().enumerate();
-        let wanted = every.filter(|(which, (name, _))| self.refined.has(*which) && is_wanted(name));
-        Self { refined: Refined(wanted.map(|(which, _)| Refined::by(which).0).sum()), ..self }
+    fn refined_as(self, is_wanted: impl Fn(&str) -> bool) -> Self {
+        Self { refined: Refined::those(self.effect, |which, name| self.refined.has(which) && is_wanted(name)), ..self }
     }
 
     /// A model with its refinements at their neutral defaults.
-    pub fn unrefined(self, model: &Parameters) -> Parameters {
+    fn unrefined(self, model: &Parameters) -> Parameters {
         let default = Parameters::default();
         let (variables, neutral): (Vec<_>, Vec<_>) =
             self.refinements().map(|(name, _)| declared(&default, name)).unzip();
@@ -139,6 +143,15 @@ impl Part {
     /// How many starts its form has.
     fn starts(self) -> usize {
         count_starts(self.freed())
+    }
+}
+
+/// How many recordings there must be for a parameter to mean anything: some hold in the second or in the third alone.
+pub(super) fn recordings_for(name: &str) -> usize {
+    match name.rsplit('.').next() {
+        Some("second") => 2,
+        Some("third") => 3,
+        _ => 1,
     }
 }
 
@@ -170,6 +183,16 @@ impl Hypothesis {
     /// With one effect less.
     pub fn without(&self, effect: &str) -> Self {
         Self { parts: self.parts.iter().copied().filter(|part| part.effect.name != effect).collect() }
+    }
+
+    /// With only those of its refinements whose parameters are wanted.
+    fn refined_as(&self, is_wanted: impl Fn(&str) -> bool) -> Self {
+        Self { parts: self.parts.iter().map(|part| part.refined_as(&is_wanted)).collect() }
+    }
+
+    /// Whether any refinement is free.
+    pub fn is_refined(&self) -> bool {
+        self.parts.iter().any(|part| part.refined != Refined::NOT)
     }
 
     /// Names of the effects, sorted.
@@ -384,6 +407,14 @@ impl<'a> Bench<'a> {
         best.map(|(fitted, _)| fitted)
     }
 
+    /// A hypothesis with only those of its refinements whose parameters are wanted, fitted anew; `None` where it cannot be simulated.
+    pub fn less_refined(&self, fitted: &Fitted, is_wanted: impl Fn(&str) -> bool) -> Option<Fitted> {
+        let Fitted { hypothesis, parameters, .. } = fitted;
+        let fewer = hypothesis.refined_as(is_wanted);
+        let plain = hypothesis.parts.iter().fold(*parameters, |model, part| part.unrefined(&model));
+        self.exact_fit(&fewer, &fewer.at_work_in(&plain, parameters), Scope::All)
+    }
+
     /// A model at least as good, with sizes nearby of those effects whose error has many minima.
     pub fn scanned(&self, fitted: &Fitted) -> Parameters {
         let sizes = fitted.hypothesis.parts.iter().map(|part| part.size());
@@ -495,20 +526,18 @@ impl<'a> Bench<'a> {
     /// The forms of an effect that mean something here, rare ones among them, without refinements.
     pub fn forms(&self, effect: &'static Description) -> impl Iterator<Item = Part> {
         let forms = effect.all_forms().enumerate();
-        let possible = forms.filter(|(_, form)| form.iter().all(|freed| self.means_something(freed)));
+        let possible = forms.filter(|(_, form)| form.iter().all(|(name, _)| self.means_something(name)));
         possible.map(move |(form, _)| Part { effect, form, refined: Refined::NOT })
     }
 
     /// All refinements of an effect that mean something here.
     pub fn fully(&self, effect: &Description) -> Refined {
-        let refinements = effect.refinements.iter().enumerate().filter(|(_, freed)| self.means_something(freed));
-        Refined(refinements.map(|(which, _)| Refined::by(which).0).sum())
+        Refined::those(effect, |_, name| self.means_something(name))
     }
 
     /// Whether there are as many recordings as a parameter is for.
-    fn means_something(&self, (name, _): &Freed) -> bool {
-        let recordings = self.data.recordings().len();
-        !(name.ends_with(".second") && recordings < 2 || name.ends_with(".third") && recordings < 3)
+    fn means_something(&self, name: &str) -> bool {
+        self.data.recordings().len() >= recordings_for(name)
     }
 
     /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.

@@ -26,7 +26,7 @@ use crate::quality;
 use crate::simulation::replay;
 use crate::variables::Declared;
 use crate::{Error, Result};
-use candidates::{Bench, Fitted, Off, Part};
+use candidates::{Bench, Fitted, Off, Part, recordings_for};
 use residuals::Data;
 use residuals::Scope;
 use selection::{Chosen, Judged, Search};
@@ -263,7 +263,7 @@ fn answer(
 
 /// How to simulate another recording than the first with causes that have values of their own there.
 fn of_several(chosen: &Chosen, recordings: &[Recording]) -> Option<String> {
-    let differ = |part: &&Part| part.freed().any(|(name, _)| name.ends_with(".second") || name.ends_with(".third"));
+    let differ = |part: &&Part| part.freed().any(|(name, _)| recordings_for(name) > 1);
     let numbers = chosen.model.hypothesis.parts.iter().filter(differ);
     let numbers: Vec<_> = numbers.map(|part| format!("`{}.recording`", part.effect.name)).collect();
     let names: Vec<_> =

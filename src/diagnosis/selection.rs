@@ -1,8 +1,6 @@
 //! Which causes are named, if any: forward selection over a beam of hypotheses, with refusal in both directions.
 
-use super::candidates::{
-    Bench, Fitted, Hypothesis, Part, Refined, Slopes, Start, declared, has_many_minima, neutralised,
-};
+use super::candidates::{Bench, Fitted, Part, Refined, Slopes, Start, declared, has_many_minima, neutralised};
 use super::residuals::{Data, Loss, Scope};
 use super::{FittedParameter, Verdict};
 use crate::effects::{Effects, Holds};
@@ -385,13 +383,14 @@ impl<'a, 'b> Search<'a, 'b> {
             return judged;
         }
         let fully = self.bench.fully(part.effect);
-        let ways: Vec<_> = if part.refined == Refined::NOT {
+        let mut ways: Vec<_> = if part.refined == Refined::NOT {
             [Refined::NOT, fully].into_iter().chain(fully.each()).collect()
         } else if part.refined == fully {
             return judged;
         } else {
             vec![fully]
         };
+        ways.dedup(); // where there is one refinement, or none
         // What hangs on details hangs on what the corrections do here, too.
         let slopes = self.bench.slopes_of(&judged.fitted);
         let better = ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes));
@@ -610,20 +609,17 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
     fn simplest(&self, judged: &Judged) -> Judged {
-        let Fitted { hypothesis: Hypothesis { parts }, parameters, .. } = &judged.fitted;
-        if parts.iter().all(|part| part.refined == Refined::NOT) {
+        if !judged.fitted.hypothesis.is_refined() {
             return judged.clone();
         }
-        let start = parts.iter().fold(*parameters, |start, part| part.unrefined(&start));
-        let parts = parts.iter().map(|part| Part { refined: Refined::NOT, ..*part }).collect();
-        let plain = self.bench.exact_fit(&Hypothesis { parts }, &start, Scope::All);
+        let plain = self.bench.less_refined(&judged.fitted, |_| false);
         let plain = plain.filter(|fitted| is_negligible(&fitted.losses)).map(|fitted| self.judge(fitted));
         plain.unwrap_or_else(|| judged.clone())
     }
 
     /// The hypothesis without those refinements that may as well be neutral: by their intervals, and by what is lost without them.
     fn without_idle(&self, judged: Judged) -> Judged {
-        if judged.fitted.hypothesis.parts.iter().all(|part| part.refined == Refined::NOT) {
+        if !judged.fitted.hypothesis.is_refined() {
             return judged;
         }
         let neutral = Parameters::default();
@@ -646,11 +642,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The hypothesis without some of its refinements; `None` where more is lost than chance takes.
     fn spared(&self, judged: &Judged, idle: &[&FittedParameter]) -> Option<Judged> {
         let is_wanted = |name: &str| idle.iter().all(|idle| idle.name != name);
-        let parts = &judged.fitted.hypothesis.parts;
-        let hypothesis = Hypothesis { parts: parts.iter().map(|part| part.refined_as(is_wanted)).collect() };
-        let plain = parts.iter().fold(judged.fitted.parameters, |start, part| part.unrefined(&start));
-        let start = hypothesis.at_work_in(&plain, &judged.fitted.parameters);
-        let fewer = self.judge(self.bench.exact_fit(&hypothesis, &start, Scope::All)?);
+        let fewer = self.judge(self.bench.less_refined(&judged.fitted, is_wanted)?);
         let [likelihood, without] =
             [judged, &fewer].map(|judged| self.bench.data.log_likelihood(&judged.fitted.losses));
         (is_possible(&fewer) && likelihood - without <= SPARED * idle.len() as f64).then_some(fewer)

@@ -387,23 +387,23 @@ class ValveOffset(Form):
         return command + self.volts
 
 
-def shares(random):
-    """Of an offset in each recording, where it is set anew."""
-    return {"shares": [1.0, *random.uniform(-0.5, 1.5, 2)]}
+def set_anew(form, name):
+    """The form of an offset whose size of this name is another one in each recording."""
+
+    class Anew(form):
+        @staticmethod
+        def sizes(random, severity):
+            return {**form.sizes(random, severity), "shares": [1.0, *random.uniform(-0.5, 1.5, 2)]}
+
+        @staticmethod
+        def in_recording(size, number):
+            return {name: size[name] * size["shares"][number]}
+
+    Anew.__name__ = f"{form.__name__}Anew"
+    return Anew
 
 
-def at_share(size, name, number):
-    return {name: size[name] * size["shares"][number]}
-
-
-class ValveOffsetAnew(ValveOffset):
-    @staticmethod
-    def sizes(random, severity):
-        return {**ValveOffset.sizes(random, severity), **shares(random)}
-
-    @staticmethod
-    def in_recording(size, number):
-        return at_share(size, "volts", number)
+ValveOffsetAnew = set_anew(ValveOffset, "volts")
 
 
 class WeakSupply(Form):
@@ -469,14 +469,7 @@ class PositionOffset(Form):
         return p, x + self.off, force
 
 
-class PositionOffsetAnew(PositionOffset):
-    @staticmethod
-    def sizes(random, severity):
-        return {**PositionOffset.sizes(random, severity), **shares(random)}
-
-    @staticmethod
-    def in_recording(size, number):
-        return at_share(size, "off", number)
+PositionOffsetAnew = set_anew(PositionOffset, "off")
 
 
 class PositionGain(Form):
@@ -507,14 +500,7 @@ class PressureOffset(Form):
         return p + self.off, x, force
 
 
-class PressureOffsetAnew(PressureOffset):
-    @staticmethod
-    def sizes(random, severity):
-        return {**PressureOffset.sizes(random, severity), **shares(random)}
-
-    @staticmethod
-    def in_recording(size, number):
-        return at_share(size, "off", number)
+PressureOffsetAnew = set_anew(PressureOffset, "off")
 
 
 class PressureGain(Form):
@@ -535,14 +521,7 @@ class ForceOffset(Form):
         return p, x, force + self.off
 
 
-class ForceOffsetAnew(ForceOffset):
-    @staticmethod
-    def sizes(random, severity):
-        return {**ForceOffset.sizes(random, severity), **shares(random)}
-
-    @staticmethod
-    def in_recording(size, number):
-        return at_share(size, "off", number)
+ForceOffsetAnew = set_anew(ForceOffset, "off")
 
 
 class ForceSensorGain(Form):
