@@ -64,9 +64,8 @@ impl Effect for EndEffects {
         forms: &[
             &[("end_effects.excess", &[0.1, 0.02, -0.02])],
             &[("end_effects.excess", &[0.1, 0.02, -0.02]), ("end_effects.elastic_share", &[0.0])],
-            &[("end_effects.taper", &[0.15]), ("end_effects.taper_length", &[0.02, 0.05])],
         ],
-        further_forms: &[],
+        further_forms: &[&[("end_effects.taper", &[0.15]), ("end_effects.taper_length", &[0.02, 0.05])]],
         refinements: &[("end_effects.low_pressure_excess", &[0.05]), ("end_effects.growth", &[0.3])],
     };
 
