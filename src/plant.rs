@@ -20,8 +20,16 @@ const LIMITS: &str = "Static force identified at 0.5 to 4.5 bar and 100 to 800 N
 const SOURCE: &str = "Master thesis \u{201c}Comparative Assessment and Improvement of Pneumatic Artificial Muscles \
     Modelling\u{201d}, Politecnico di Milano: chapters 3 and 4, with the corrections that the force models state, eqs. 5.3, 5.4.";
 
-/// Steps of the secant that finds the pull through what stretches, and the relative change of the pull that ends it.
-const MOST_SECANTS: usize = 20;
+/// Stiffness of what stretches, times this time in s, is how it damps: without mass and loss it would be infinitely fast.
+const LOSS_TIME: f64 = 5e-4;
+/// Pull in N from which on it does: where it becomes slack, nothing jumps.
+const TAUT: f64 = 10.0;
+/// Slack in m that is more than any muscle is long.
+const MOST_SLACK: f64 = 0.5;
+/// Damping in N s/m that a muscle has at least while it moves by itself.
+const LEAST_DAMPING: f64 = 1.0;
+/// Steps in which it is found how what stretches moves, and the share of its pull that ends that.
+const MOST_STEPS: usize = 40;
 const SAME_FORCE: f64 = 1e-12;
 
 crate::variables::signals! {
@@ -95,35 +103,99 @@ fn extent(parameters: &Parameters) -> Extent {
     }
 }
 
-/// Pull in N on a load at a contraction, with damping, effects and correction; `own` are the states of the effects.
-///
-/// The muscle itself contracts further by what stretches between it and the load under that pull: a secant finds it.
+/// The point of the muscle itself behind that of its load, and its pull on the load in N; `own` are the states of the effects.
 #[inline]
-fn muscle_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
-    let stretched = |force: f64| {
-        let contraction = at.contraction + parameters.effects.stretch(force);
-        rigid_force(parameters, &Point { contraction, ..*at }, own)
-    };
-    let mut before = rigid_force(parameters, at, own);
-    if parameters.effects.stretch(before) == 0.0 {
-        return before;
-    }
-    let mut lack_before = stretched(before) - before;
-    let mut force = before + lack_before;
-    for _ in 0..MOST_SECANTS {
-        let lack = stretched(force) - force;
-        if lack.abs() <= SAME_FORCE * (1.0 + force.abs()) || lack == lack_before {
-            break;
-        }
-        let next = force - lack * (force - before) / (lack - lack_before);
-        (before, lack_before, force) = (force, lack, next);
-    }
-    force
+fn pulling(parameters: &Parameters, at: Point, own: &[f64]) -> (Point, f64) {
+    let stretched = parameters.effects.tension(own).map(|tension| stretched(parameters, &at, own, tension));
+    stretched.unwrap_or_else(|| (at, muscle_force(parameters, &at, own)))
 }
 
-/// As [`muscle_force`], with nothing that stretches.
+/// The point of the muscle itself behind that of its load.
 #[inline]
-fn rigid_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
+fn of_muscle(parameters: &Parameters, at: Point, own: &[f64]) -> Point {
+    parameters.effects.tension(own).map_or(at, |tension| stretched(parameters, &at, own, tension).0)
+}
+
+/// The same with the pull, behind something that stretches: it gives way at such a rate that the pull of the muscle, which moves along,
+/// is the one that it passes on. A `tension` below zero says how slack it is.
+fn stretched(parameters: &Parameters, at: &Point, own: &[f64], tension: f64) -> (Point, f64) {
+    let stretch = |tension: f64| parameters.effects.stretch(tension);
+    let difference = 1e-4 * (1.0 + tension.abs());
+    let compliance = (stretch(tension + difference) - stretch(tension - difference)) / (2.0 * difference);
+    let point = |tension_rate: f64| Point {
+        contraction: at.contraction + stretch(tension),
+        contraction_velocity: at.contraction_velocity + compliance * tension_rate,
+        tension_rate,
+        ..*at
+    };
+    let loss = LOSS_TIME * (tension / TAUT).clamp(0.0, 1.0);
+    let passed_on = |rate: f64| tension.max(0.0) + loss * rate;
+    let of_muscle = |rate: f64| muscle_force(parameters, &point(rate), own) - LEAST_DAMPING * compliance * rate;
+    let lack = |rate: f64| of_muscle(rate) - passed_on(rate);
+    // What damps the muscle is nominal, and else no less than nothing.
+    let (at_rest, least) = (lack(0.0), loss + compliance * LEAST_DAMPING);
+    let guess = at_rest / (least + compliance * parameters.muscle.damping);
+    let rate = root(lack, at_rest, guess, at_rest / least, SAME_FORCE * (1.0 + tension.abs()));
+    (point(rate), passed_on(rate))
+}
+
+/// Tension in N of what stretches with a load at rest or one that moves evenly, or the pull of the muscle where nothing does; with the
+/// effects as they are at the start.
+fn resting_tension(parameters: &Parameters, at: &Point) -> f64 {
+    let effects = &parameters.effects;
+    let pull = |contraction: f64| {
+        let at = with_pull(parameters, &Point { contraction, ..*at });
+        muscle_force(parameters, &at, &effects.start(&at))
+    };
+    let rigid = pull(at.contraction);
+    if effects.stretch(rigid) == 0.0 {
+        return rigid;
+    }
+    let stretched = |tension: f64| pull(at.contraction + effects.stretch(tension));
+    if rigid < 0.0 {
+        // The muscle would push: it is as long as it is without a load.
+        return bisect(stretched, MOST_SLACK / effects.stretch(-1.0), 0.0);
+    }
+    root(|tension| stretched(tension) - tension, rigid, rigid, 10.0 * rigid, SAME_FORCE * (1.0 + rigid))
+}
+
+/// Pull in N on a load at rest.
+fn resting_pull(parameters: &Parameters, at: &Point) -> f64 {
+    let tension = resting_tension(parameters, at);
+    if parameters.effects.stretch(tension) == 0.0 { tension } else { tension.max(0.0) }
+}
+
+/// The root of a function that falls, between zero, its value at which is given, and a bound of the same sign; from a guess to where the
+/// function is small enough, or as near as so many steps come (false position, Illinois).
+fn root(function: impl Fn(f64) -> f64, at_zero: f64, guess: f64, bound: f64, small: f64) -> f64 {
+    if at_zero.abs() <= small {
+        return 0.0;
+    }
+    let (mut near, mut value_near) = (0.0, at_zero);
+    let (mut far, mut value_far) = (bound, -at_zero);
+    let mut now = guess;
+    for _ in 0..MOST_STEPS {
+        let value = function(now);
+        if value.abs() <= small {
+            break;
+        }
+        if value * at_zero > 0.0 {
+            (near, value_near, value_far) = (now, value, 0.5 * value_far);
+        } else {
+            (far, value_far, value_near) = (now, value, 0.5 * value_near);
+        }
+        let next = near - value_near * (far - near) / (value_far - value_near);
+        if next == now {
+            break;
+        }
+        now = next;
+    }
+    now
+}
+
+/// Pull of the muscle in N at its own point, with damping, effects and correction; `own` are the states of the effects.
+#[inline]
+fn muscle_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
     let Parameters { muscle, force_models, effects, unknown_cause, .. } = parameters;
     let pressure = effects.effective_pressure(at, at.gauge_pressure);
     let contraction = effects.effective_contraction(at, own, at.contraction);
@@ -183,8 +255,13 @@ pub fn masses(parameters: &Parameters) -> (f64, f64) {
 /// Point of a muscle at rest, its valve asking for the pressure that is there.
 fn at_rest(gauge_pressure: f64, contraction: f64) -> Point {
     let (commanded_pressure, target_pressure) = (gauge_pressure, gauge_pressure);
-    let (contraction_velocity, pressure_pull) = (0.0, 0.0);
-    Point { commanded_pressure, target_pressure, gauge_pressure, contraction, contraction_velocity, pressure_pull }
+    let nothing = Point::default();
+    Point { commanded_pressure, target_pressure, gauge_pressure, contraction, ..nothing }
+}
+
+/// The same of a muscle that is moved.
+fn moved(gauge_pressure: f64, contraction: f64, contraction_velocity: f64) -> Point {
+    Point { contraction_velocity, ..at_rest(gauge_pressure, contraction) }
 }
 
 /// The point as the states of effects see it.
@@ -194,9 +271,11 @@ fn with_pull(parameters: &Parameters, at: &Point) -> Point {
     Point { pressure_pull, ..*at }
 }
 
-/// States of the effects at the start.
+/// States of the effects at the start, at the point of a load at rest or one that moves evenly.
 fn effects_at_start(parameters: &Parameters, at: &Point) -> [f64; Effects::STATES] {
-    parameters.effects.start(&with_pull(parameters, at))
+    let tension = resting_tension(parameters, at);
+    let contraction = at.contraction + parameters.effects.stretch(tension);
+    parameters.effects.start(&with_pull(parameters, &Point { contraction, tension, ..*at }))
 }
 
 /// Gauge pressure in Pa at which the valve comes to rest under a command in V, with a contraction in m.
@@ -233,10 +312,7 @@ pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
     if parameters.are_nominal() {
         return nominal;
     }
-    let lack = |gauge_pressure: f64| {
-        let at = at_rest(gauge_pressure, contraction);
-        weight - muscle_force(parameters, &at, &effects_at_start(parameters, &at))
-    };
+    let lack = |gauge_pressure: f64| weight - resting_pull(parameters, &at_rest(gauge_pressure, contraction));
     let highest = 2.0 * nominal + 5e5;
     if lack(0.0) <= 0.0 || lack(highest) > 0.0 { nominal } else { bisect(lack, 0.0, highest) }
 }
@@ -247,10 +323,7 @@ pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
 /// Among several it is the longest muscle whose stiffness is positive.
 pub fn equilibrium(parameters: &Parameters, gauge_pressure: f64, weight: f64) -> Option<f64> {
     let muscle = &parameters.muscle;
-    let surplus = |contraction: f64| {
-        let at = at_rest(gauge_pressure, contraction);
-        muscle_force(parameters, &at, &effects_at_start(parameters, &at)) - weight
-    };
+    let surplus = |contraction: f64| resting_pull(parameters, &at_rest(gauge_pressure, contraction)) - weight;
     let samples = 300;
     let at = |k: i32| muscle.rest_length * (-0.2 + 0.7 * f64::from(k) / f64::from(samples));
     let bracket = (0..samples).find(|&k| surplus(at(k)) > 0.0 && surplus(at(k + 1)) <= 0.0)?;
@@ -310,9 +383,9 @@ impl System for PneumaticMuscle {
     fn rates(parameters: &Parameters, inputs: &MuscleInputs, state: &Self::State, rates: &mut Self::State) {
         let (at, own) = hanging_point(state);
         let at = with_target(parameters, inputs.command, at, own);
-        let force = muscle_force(parameters, &at, own);
-        rates.0[0] = pressure_rate(parameters, &at, own);
         rates.0[1] = at.contraction_velocity;
+        let (at, force) = pulling(parameters, at, own);
+        rates.0[0] = pressure_rate(parameters, &at, own);
         let (weighing, moving) = masses(parameters);
         rates.0[2] = (force - inputs.external_force) / moving - GRAVITY * (weighing / moving);
         parameters.effects.rates(&with_pull(parameters, &at), own, &mut rates.0[3..]);
@@ -333,16 +406,15 @@ impl System for PneumaticMuscle {
         state: &Self::State,
         memory: &PlantMemory,
     ) -> MuscleOutputs {
-        let (at, own) = hanging_point(state);
-        let force = muscle_force(parameters, &at, own);
-        let shown = readings(parameters, clock, &at, force, memory);
-        let contraction = at.contraction + parameters.effects.stretch(force);
+        let (of_load, own) = hanging_point(state);
+        let (at, force) = pulling(parameters, of_load, own);
+        let shown = readings(parameters, clock, &of_load, force, memory);
         MuscleOutputs {
-            contraction,
+            contraction: at.contraction,
             contraction_velocity: at.contraction_velocity,
             gauge_pressure: at.gauge_pressure,
             force,
-            diameter: parameters.muscle.diameter(contraction),
+            diameter: parameters.muscle.diameter(at.contraction),
             measured_contraction: shown.contraction,
             measured_gauge_pressure: shown.gauge_pressure,
             measured_force: shown.force,
@@ -499,7 +571,8 @@ impl System for PneumaticActuator {
     fn initial_state(parameters: &Parameters, inputs: &ActuatorInputs) -> Result<Self::State> {
         let gauge_pressure = parameters.initial.gauge_pressure;
         let mut state = [gauge_pressure; DRIVEN_STATES];
-        state[1..].copy_from_slice(&effects_at_start(parameters, &at_rest(gauge_pressure, inputs.contraction)));
+        let at = moved(gauge_pressure, inputs.contraction, inputs.contraction_velocity);
+        state[1..].copy_from_slice(&effects_at_start(parameters, &at));
         Ok(Extended(state))
     }
 
@@ -507,6 +580,7 @@ impl System for PneumaticActuator {
     fn rates(parameters: &Parameters, inputs: &ActuatorInputs, state: &Self::State, rates: &mut Self::State) {
         let (at, own) = driven_point(inputs, state);
         let at = with_target(parameters, inputs.command, at, own);
+        let at = of_muscle(parameters, at, own);
         rates.0[0] = pressure_rate(parameters, &at, own);
         parameters.effects.rates(&with_pull(parameters, &at), own, &mut rates.0[1..]);
     }
@@ -570,9 +644,7 @@ impl System for PneumaticActuator {
 #[inline]
 fn driven_point<'a>(inputs: &ActuatorInputs, state: &'a Extended<1, DRIVEN_STATES>) -> (Point, &'a [f64]) {
     let [gauge_pressure, own @ ..] = &state.0;
-    let mut at = at_rest(*gauge_pressure, inputs.contraction);
-    at.contraction_velocity = inputs.contraction_velocity;
-    (at, own)
+    (moved(*gauge_pressure, inputs.contraction, inputs.contraction_velocity), own)
 }
 
 crate::variables::signals! {
@@ -615,7 +687,8 @@ impl System for MuscleAlone {
 
     #[inline]
     fn rates(parameters: &Parameters, inputs: &MeasuredInputs, state: &Self::State, rates: &mut Self::State) {
-        parameters.effects.rates(&with_pull(parameters, &measured_point(inputs)), &state.0, &mut rates.0);
+        let at = of_muscle(parameters, measured_point(inputs), &state.0);
+        parameters.effects.rates(&with_pull(parameters, &at), &state.0, &mut rates.0);
     }
 
     fn outputs(
@@ -641,9 +714,7 @@ impl System for MuscleAlone {
 /// The muscle alone at an instant.
 #[inline]
 fn measured_point(inputs: &MeasuredInputs) -> Point {
-    let mut at = at_rest(inputs.gauge_pressure, inputs.contraction);
-    at.contraction_velocity = inputs.contraction_velocity;
-    at
+    moved(inputs.gauge_pressure, inputs.contraction, inputs.contraction_velocity)
 }
 
 /// Outputs of a muscle whose motion is given; `own` are the states of the effects.
@@ -655,7 +726,7 @@ fn driven_outputs(
     own: &[f64],
     memory: &PlantMemory,
 ) -> ActuatorOutputs {
-    let force = muscle_force(parameters, at, own);
+    let (_, force) = pulling(parameters, *at, own);
     let shown = readings(parameters, clock, at, force, memory);
     ActuatorOutputs {
         force,

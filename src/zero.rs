@@ -1,6 +1,6 @@
 //! Zeros of sensors and of the valve, which need not stay where they are while one records.
 
-use crate::effects::of_recording;
+use crate::effects::{each_for, of_recording};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
@@ -178,31 +178,14 @@ macro_rules! zero {
 }
 pub(crate) use zero;
 
-/// Where fits of a swing start: every period in s with four phases.
-#[rustfmt::skip]
-pub(crate) const PERIODS: &[f64] = &[
-    10.0, 10.0, 10.0, 10.0, 16.0, 16.0, 16.0, 16.0, 25.0, 25.0,
-    25.0, 25.0, 40.0, 40.0, 40.0, 40.0, 65.0, 65.0, 65.0, 65.0,
-];
-#[rustfmt::skip]
-pub(crate) const PHASES: &[f64] = &[
-    0.0, 1.5, 3.0, -1.5, 0.0, 1.5, 3.0, -1.5, 0.0, 1.5,
-    3.0, -1.5, 0.0, 1.5, 3.0, -1.5, 0.0, 1.5, 3.0, -1.5,
-];
+/// Where fits of a swing start: periods in s, each with four phases.
+pub(crate) const PERIODS: &[f64] = &each_for::<20>(&[10.0, 16.0, 25.0, 40.0, 65.0], 4);
+pub(crate) const PHASES: &[f64] = &each_for::<20>(&[0.0, 1.5, 3.0, -1.5], 1);
 /// Where fits of a shift start: times in s, each twice.
-#[rustfmt::skip]
-pub(crate) const TIMES: &[f64] = &[
-    3.0, 3.0, 6.0, 6.0, 9.0, 9.0, 12.0, 12.0, 15.0, 15.0, 18.0, 18.0, 21.0, 21.0, 24.0, 24.0,
-    27.0, 27.0, 30.0, 30.0, 34.0, 34.0, 38.0, 38.0, 43.0, 43.0, 50.0, 50.0, 60.0, 60.0, 75.0, 75.0,
-];
+pub(crate) const TIMES: &[f64] =
+    &each_for::<32>(&[3.0, 6.0, 9.0, 12.0, 15.0, 18.0, 21.0, 24.0, 27.0, 30.0, 34.0, 38.0, 43.0, 50.0, 60.0, 75.0], 2);
 
 /// A shift up and one down for each of these times.
 pub(crate) const fn either_way(size: f64) -> [f64; TIMES.len()] {
-    let mut sizes = [size; TIMES.len()];
-    let mut k = 1;
-    while k < sizes.len() {
-        sizes[k] = -size;
-        k += 2;
-    }
-    sizes
+    each_for(&[size, -size], 1)
 }

@@ -191,6 +191,16 @@ fn effects_agree_with_scipy() {
             ],
         ),
         (
+            "two_switches",
+            &[
+                ("supply_saturation.gauge_pressure", 1.75e5),
+                ("supply_saturation.span", 0.3e5),
+                ("supply_saturation.period", 4.0),
+                ("supply_saturation.phase", 0.375),
+                ("supply_saturation.refill", 0.25),
+            ],
+        ),
+        (
             "swinging_zero",
             &[
                 ("valve_offset.offset", 0.12),
@@ -256,11 +266,14 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("counterweight", &[("payload_mass.additional_mass", -3.0), ("payload_mass.inertia", 6.0)]),
+        ("tapered_ends", &[("end_effects.taper", 0.18), ("end_effects.taper_length", 0.04)]),
+        ("rope", &[("series_elasticity.load_compliance", 1.0 / 15e3)]),
         ("series_elasticity", &[("series_elasticity.compliance", -8e-6), ("series_elasticity.exponent", 0.85)]),
         (
             "threshold",
             &[
                 ("threshold_pressure.lost", 0.6e5),
+                ("threshold_pressure.lasting", 0.1e5),
                 ("threshold_pressure.fade", 0.7e5),
                 ("threshold_pressure.exponent", 1.5),
                 ("threshold_pressure.decrease_with_contraction", 0.3),

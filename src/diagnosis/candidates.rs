@@ -148,9 +148,9 @@ impl Part {
 
 /// How many recordings there must be for a parameter to mean anything: some hold in the second or in the third alone.
 pub(super) fn recordings_for(name: &str) -> usize {
-    match name.rsplit('.').next() {
-        Some("second") => 2,
-        Some("third") => 3,
+    match name.split('.').next_back() {
+        Some("second" | "second_phase") => 2,
+        Some("third" | "third_phase") => 3,
         _ => 1,
     }
 }

@@ -409,15 +409,19 @@ impl<'a, 'b> Search<'a, 'b> {
         Some(self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &start)?))
     }
 
-    /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect. What the form
-    /// of one cause may leave is worth a second one; what the forms of two may leave is not worth a third.
+    /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect; or whether no single
+    /// effect has the odds for it, as each of two leaves the other one's error. What the form of one cause may leave is worth a second one;
+    /// what the forms of two may leave is not worth a third.
     fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
         let most = levels.last().map_or(0, |level| effects_of(level));
-        let leading = self.leading(levels).filter(|best| best.fitted.hypothesis.parts.len() == most);
         let asks_for_more = |best: &Judged| {
             is_unsound(&best.fitted.losses, &self.bench.data) && (most == 1 || !self.may_be_form(&best.fitted.losses))
         };
-        most < MOST_EFFECTS && leading.is_some_and(asks_for_more) && !self.is_sound(&self.baseline.losses)
+        let is_worth = match self.leading(levels) {
+            Some(best) => best.fitted.hypothesis.parts.len() == most && asks_for_more(best),
+            None => most == 1,
+        };
+        most < MOST_EFFECTS && is_worth && !self.is_sound(&self.baseline.losses)
     }
 
     /// Whether residuals are small enough to be those of forms, which are never known exactly.
@@ -502,15 +506,17 @@ impl<'a, 'b> Search<'a, 'b> {
         leaves_at_most(losses, |signal| NEGLIGIBLE + doubt(signal) + of_structure(signal).max(of_sensor(signal)))
     }
 
-    /// The best hypothesis of all levels, each of which must be worth its effects.
+    /// The best hypothesis of all levels, each of which must be worth its effects; the first may be of two.
     fn leading<'l>(&self, levels: &'l [Vec<Judged>]) -> Option<&'l Judged> {
-        let shows = |best: &&Judged| self.shows(&self.baseline.losses, &best.fitted.losses);
-        let mut best = possible(&levels[0]).filter(|best| best.evidence > LEAST_EVIDENCE).filter(shows)?;
+        let leads =
+            |best: &&Judged| best.evidence > LEAST_EVIDENCE && self.shows(&self.baseline.losses, &best.fitted.losses);
+        let mut best = possible(&levels[0]).filter(leads);
         for level in &levels[1..] {
-            let Some(more) = possible(level).filter(|more| self.is_worth(best, more)) else { break };
-            best = more;
+            let is_worth = |more: &&Judged| best.map_or_else(|| leads(more), |best| self.is_worth(best, more));
+            let Some(more) = possible(level).filter(is_worth) else { break };
+            best = Some(more);
         }
-        Some(best)
+        best
     }
 
     /// Whether a hypothesis with more effects is worth them: it pays, and explains a good part of what is left without.

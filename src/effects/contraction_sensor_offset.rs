@@ -57,10 +57,6 @@ impl Effect for ContractionSensorOffset {
         self.course().is_plausible()
     }
 
-    fn in_recording(&mut self, number: f64) {
-        self.recording = number;
-    }
-
     fn own_course(&self, time: f64) -> f64 {
         self.course().at(time)
     }

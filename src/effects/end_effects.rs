@@ -8,7 +8,9 @@ crate::variables::variables! {
     ///
     /// # Model
     /// The braid feels k x in place of the contraction x, k = 1 + (c + a exp(−p/1 bar)) (1 + g (x/0.1 m − 1)): `excess` c,
-    /// `low_pressure_excess` a, `growth` g. What resists elastically feels x + m (k − 1) x: `elastic_share` m.
+    /// `low_pressure_excess` a, `growth` g. What resists elastically feels x + m (k − 1) x: `elastic_share` m. Ends that taper
+    /// while the muscle is long take off the area: p A ← p A (1 − t exp(−x/x_t)), `taper` t, `taper_length` x_t; no
+    /// more than t where the muscle is longer than at rest.
     ///
     /// # In the data
     /// The force residual grows with the contraction and with pressure; with the rest length it shrinks.
@@ -28,6 +30,10 @@ crate::variables::variables! {
         growth: f64 = 0.0, ONE, (-1.0..=1.0);
         /// Share of the excess that the membrane feels, too
         elastic_share: f64 = 1.0, ONE, (0.0..=1.0);
+        /// Share of the area that tapered ends take off at full length
+        taper: f64 = 0.0, ONE, (-0.5..=0.9);
+        /// Contraction over which that fades
+        taper_length: f64 = 0.03, METRE, (0.005..=0.1);
     }
 }
 
@@ -49,7 +55,7 @@ impl Effect for EndEffects {
     const DESCRIPTION: Description = Description {
         name: "end_effects",
         meaning: "the ends are no cylinder: the contraction counts k times",
-        equation: "x <- k x, k = 1 + (c + a exp(-p/1 bar)) (1 + g (x/0.1 m - 1));  membrane: x <- x + m (k - 1) x",
+        equation: "x <- k x, k = 1 + (c + a exp(-p/1 bar)) (1 + g (x/0.1 m - 1));  membrane: x <- x + m (k - 1) x;  p A <- p A (1 - t exp(-x/x_t))",
         signature: "force residual grows with contraction and pressure",
         experiment: "compare two rest lengths",
         reference: "Tondu and Lopez 2000; Kothera et al. 2009",
@@ -59,16 +65,28 @@ impl Effect for EndEffects {
             &[("end_effects.excess", &[0.1, 0.02, -0.02])],
             &[("end_effects.excess", &[0.1, 0.02, -0.02]), ("end_effects.elastic_share", &[0.0])],
         ],
-        further_forms: &[],
+        further_forms: &[&[("end_effects.taper", &[0.15]), ("end_effects.taper_length", &[0.02, 0.05])]],
         refinements: &[("end_effects.low_pressure_excess", &[0.05]), ("end_effects.growth", &[0.3])],
     };
 
     fn is_neutral(&self) -> bool {
-        self.excess == 0.0 && self.low_pressure_excess == 0.0
+        [self.excess, self.low_pressure_excess, self.taper] == [0.0; 3]
+    }
+
+    fn is_plausible(&self) -> bool {
+        // At its bounds a taper is a wrong area, or none.
+        self.taper == 0.0 || (0.0055..0.095).contains(&self.taper_length)
     }
 
     fn effective_contraction(&self, at: &Point, _own: &[f64], contraction: f64) -> f64 {
         contraction + self.beyond(at)
+    }
+
+    fn area_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
+        if self.taper == 0.0 {
+            return force;
+        }
+        force * (1.0 - self.taper * (-at.contraction.max(0.0) / self.taper_length).exp())
     }
 
     fn elastic_contraction(&self, at: &Point, _own: &[f64], contraction: f64) -> f64 {
@@ -76,6 +94,13 @@ impl Effect for EndEffects {
     }
 
     fn sentence(&self) -> String {
+        if self.taper != 0.0 {
+            let (percent, length) = (100.0 * self.taper.abs(), 1e3 * self.taper_length);
+            let word = if self.taper < 0.0 { "more" } else { "less" };
+            return format!(
+                "The ends of the muscle taper: at full length the pressure pulls {percent:.1} % {word}, which fades within {length:.0} mm."
+            );
+        }
         let at_two_bar = 1.0 + self.excess + self.low_pressure_excess * (-2e5 / FADE).exp();
         let membrane = if self.elastic_share == 1.0 {
             String::new()

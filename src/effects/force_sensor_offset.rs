@@ -47,10 +47,6 @@ impl Effect for ForceSensorOffset {
         self.course().is_plausible()
     }
 
-    fn in_recording(&mut self, number: f64) {
-        self.recording = number;
-    }
-
     fn own_course(&self, time: f64) -> f64 {
         self.course().at(time)
     }

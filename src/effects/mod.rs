@@ -9,7 +9,7 @@ use crate::memory::Slack;
 use crate::variables::{Declared, Variable};
 
 /// The plant at one instant, as the hooks of an effect see it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Point {
     /// Gauge pressure that the command asks for, Pa; with a measured pressure, that one.
     pub commanded_pressure: f64,
@@ -23,6 +23,10 @@ pub struct Point {
     pub contraction_velocity: f64,
     /// Pull of the pressure on the virtual area without effects, N; known only to the hooks of the states, `start` and `rates`.
     pub pressure_pull: f64,
+    /// Tension of what stretches between muscle and load, N; known only to `start`.
+    pub tension: f64,
+    /// Its rate, N/s; known only to `rates`.
+    pub tension_rate: f64,
 }
 
 impl Point {
@@ -123,6 +127,17 @@ pub struct Description {
 /// each parameter, or its last.
 pub type Freed = (&'static str, &'static [f64]);
 
+/// Each of some values for so many starts in turn, and so on, for `N` starts in all: what all combinations of several lists are made of.
+pub(crate) const fn each_for<const N: usize>(values: &[f64], times: usize) -> [f64; N] {
+    let mut all = [0.0; N];
+    let mut k = 0;
+    while k < N {
+        all[k] = values[k / times % values.len()];
+        k += 1;
+    }
+    all
+}
+
 impl Description {
     /// All forms, the common ones first.
     pub fn all_forms(&self) -> impl Iterator<Item = &'static [Freed]> {
@@ -155,8 +170,10 @@ pub trait Effect: Declared + Default {
     fn is_plausible(&self) -> bool {
         true
     }
-    /// Has it be as it is in one of several recordings, by its number from 1.
-    fn in_recording(&mut self, _number: f64) {}
+    /// Has it be as it is in one of several recordings, by its number from 1, where that makes a difference to it.
+    fn in_recording(&mut self, number: f64) {
+        self.visit_mut(&mut |variable, old| if variable.name.ends_with(".recording") { number } else { old });
+    }
     /// What it does at a time in s since the start whatever the muscle does, where it goes its own way over time; SI.
     fn own_course(&self, _time: f64) -> f64 {
         0.0
@@ -222,8 +239,12 @@ pub trait Effect: Declared + Default {
     fn muscle_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
         force
     }
-    /// Length in m by which what is between muscle and load stretches under a pull in N.
-    fn stretch(&self, _force: f64) -> f64 {
+    /// Tension in N of what stretches between muscle and load, below zero where it is slack; `None` where nothing does.
+    fn tension(&self, _own: &[f64]) -> Option<f64> {
+        None
+    }
+    /// Length in m by which what is between muscle and load stretches under a tension in N.
+    fn stretch(&self, _tension: f64) -> f64 {
         0.0
     }
     /// Mass in kg that weighs.
@@ -453,10 +474,25 @@ macro_rules! effects {
                 force
             }
 
-            /// Length in m by which what is between muscle and load stretches under a pull in N.
+            /// Tension in N of what stretches between muscle and load, by the states of all effects; `None` where nothing does.
             #[inline]
-            pub fn stretch(&self, force: f64) -> f64 {
-                0.0 $(+ self.$field.stretch(force))*
+            pub fn tension(&self, states: &[f64]) -> Option<f64> {
+                let mut rest = states;
+                $(
+                    let (own, others) = rest.split_at($Effect::STATE_SCALES.len());
+                    rest = others;
+                    if let Some(tension) = self.$field.tension(own) {
+                        return Some(tension);
+                    }
+                )*
+                let _ = rest;
+                None
+            }
+
+            /// Length in m by which what is between muscle and load stretches under a tension in N.
+            #[inline]
+            pub fn stretch(&self, tension: f64) -> f64 {
+                0.0 $(+ self.$field.stretch(tension))*
             }
 
             /// Masses in kg of a load that weigh and that move, in this order, where one was entered.

@@ -1,11 +1,11 @@
-use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, Readings};
 
 crate::variables::variables! {
     /// Something in series with the muscle that stretches: a cable, a fitting, the frame.
     ///
     /// # Model
     /// Between muscle and load: the load moves by x, the muscle contracts by x + c F₀ g(F) with F₀ = 400 N and a pull
-    /// F > 0; the position sensor shows x. Beside the path of the load, where the frame that carries the sensor gives way:
+    /// F > 0 in the cable; the position sensor shows x. Beside the path of the load, where the frame that carries the sensor gives way:
     /// x_measured ← x + s F₀ g(F). `load_compliance` c, `compliance` s of either sign; g(F) = (F/F₀)ᵉ, `exponent` e below 1 for a
     /// cable that hardens, or ((F + F₁)ᵉ − F₁ᵉ)/((F₀ + F₁)ᵉ − F₁ᵉ) for one that hardens beyond a `toe_force` F₁ only: the smaller e, the
     /// sooner, as a logarithm for 0 and to an end below.
@@ -15,8 +15,8 @@ crate::variables::variables! {
     /// stiffer or softer bladder does not depend on pressure with the length locked; an elastic cable does.
     ///
     /// # Validity
-    /// A cable without mass or loss. The muscle is damped by the velocity of the load; the rate of the stretch is
-    /// neglected there, a few per cent of it. 10⁵ to 10⁶ N/m are usual stiffnesses.
+    /// A cable without mass that pulls and never pushes, and loses as much as a damper of 0.5 ms times its stiffness. The
+    /// muscle moves by itself: its damping, friction and creep are of its own contraction. 10⁵ to 10⁶ N/m are usual stiffnesses.
     ///
     /// # Reference
     /// Hooke's law; power law of slack strands.
@@ -32,6 +32,8 @@ crate::variables::variables! {
     }
 }
 
+/// Tension in N up to which a cable goes on as it is when slack: with a tension below zero for its slack the muscle has a state there, too.
+const NEARLY_SLACK: f64 = 1.0;
 /// Smallest power without a toe: the stiffness of less is that of a wall.
 const LEAST_EXPONENT: f64 = 0.3;
 /// Pull in N below which a toe is none, and the one that makes up for a smaller power.
@@ -77,6 +79,9 @@ impl Effect for SeriesElasticity {
         refinements: &[("series_elasticity.exponent", &[0.8]), ("series_elasticity.toe_force", &[100.0])],
     };
 
+    /// Tension of what stretches between muscle and load.
+    const STATE_SCALES: &'static [f64] = &[10.0];
+
     fn is_neutral(&self) -> bool {
         self.compliance == 0.0 && self.load_compliance == 0.0
     }
@@ -85,8 +90,25 @@ impl Effect for SeriesElasticity {
         self.exponent > LEAST_EXPONENT || self.toe_force > OWN_TOE
     }
 
-    fn stretch(&self, force: f64) -> f64 {
-        self.way(self.load_compliance, force)
+    fn rests(&self) -> bool {
+        self.load_compliance == 0.0
+    }
+
+    fn start(&self, at: &Point, own: &mut [f64]) {
+        own[0] = at.tension;
+    }
+
+    fn rates(&self, at: &Point, _own: &[f64], rates: &mut [f64]) {
+        rates[0] = at.tension_rate;
+    }
+
+    fn tension(&self, own: &[f64]) -> Option<f64> {
+        (!self.rests()).then(|| own[0])
+    }
+
+    fn stretch(&self, tension: f64) -> f64 {
+        let way = |tension: f64| self.way(self.load_compliance, tension);
+        if tension < NEARLY_SLACK { way(NEARLY_SLACK) * tension / NEARLY_SLACK } else { way(tension) }
     }
 
     fn readings(&self, readings: Readings) -> Readings {

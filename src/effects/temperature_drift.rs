@@ -109,10 +109,6 @@ impl Effect for TemperatureDrift {
         self.time_constant > FASTEST && self.deepest() > -MOST_ASTRAY
     }
 
-    fn in_recording(&mut self, number: f64) {
-        self.recording = number;
-    }
-
     fn start(&self, _at: &Point, own: &mut [f64]) {
         own.fill(of_recording(self.recording, [0.0, self.second, self.third]));
     }

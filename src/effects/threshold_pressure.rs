@@ -4,12 +4,12 @@ crate::variables::variables! {
     /// Pressure that is lost before the muscle responds.
     ///
     /// # Model
-    /// The area feels p − l exp(−(p/f)ᵉ) (1 − d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
-    /// `decrease_with_contraction` d.
+    /// The area feels p − l₀ − l exp(−(p/f)ᵉ) (1 − d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
+    /// `decrease_with_contraction` d; `lasting` l₀ does not fade.
     ///
     /// # In the data
     /// The force falls short at low pressure only, by the same in both directions; above a bar or two nothing is wrong.
-    /// An offset of the pressure sensor does not fade, a dead band of the valve has a direction.
+    /// An offset of the pressure sensor does not fade, and shows in its readings; a dead band of the valve has a direction.
     ///
     /// # Validity
     /// 0.2 to 1 bar are usual. With a large exponent the loss ends at once.
@@ -26,6 +26,8 @@ crate::variables::variables! {
         exponent: f64 = 1.0, ONE, (0.5..=6.0);
         /// Relative decrease of the loss at 0.1 m of contraction
         decrease_with_contraction: f64 = 0.0, ONE, (-1.0..=1.0);
+        /// Pressure that is lost at any pressure
+        lasting: f64 = 0.0, PASCAL, (0.0..=4e5);
     }
 }
 
@@ -33,7 +35,7 @@ impl Effect for ThresholdPressure {
     const DESCRIPTION: Description = Description {
         name: "threshold_pressure",
         meaning: "pressure lost before the muscle responds, which matters at low pressure",
-        equation: "p <- max(0, p - l exp(-(p/f)^e) (1 - d x/0.1 m))",
+        equation: "p <- max(0, p - l0 - l exp(-(p/f)^e) (1 - d x/0.1 m))",
         signature: "force falls short at low pressure only, the same in both directions",
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
@@ -47,7 +49,7 @@ impl Effect for ThresholdPressure {
                 ("threshold_pressure.exponent", &[4.0]),
             ],
         ],
-        further_forms: &[],
+        further_forms: &[&[("threshold_pressure.lasting", &[0.3e5])]],
         refinements: &[
             ("threshold_pressure.exponent", &[1.5, 2.5]),
             ("threshold_pressure.decrease_with_contraction", &[0.2]),
@@ -55,7 +57,7 @@ impl Effect for ThresholdPressure {
     };
 
     fn is_neutral(&self) -> bool {
-        self.lost == 0.0
+        self.lost == 0.0 && self.lasting == 0.0
     }
 
     fn effective_pressure(&self, at: &Point, pressure: f64) -> f64 {
@@ -66,14 +68,18 @@ impl Effect for ThresholdPressure {
         let power = if self.exponent == 1.0 { relative } else { relative.powf(self.exponent) };
         let contracted = 1.0 - self.decrease_with_contraction * at.relative_contraction();
         // A pressure that was negative before is no business of this effect.
-        (pressure - self.lost * (-power).exp() * contracted.max(0.0)).max(pressure.min(0.0))
+        let lost = self.lasting + self.lost * (-power).exp() * contracted.max(0.0);
+        (pressure - lost).max(pressure.min(0.0))
     }
 
     fn sentence(&self) -> String {
-        let at_one_bar = self.lost * (-(1e5 / self.fade).powf(self.exponent)).exp();
+        if self.lost == 0.0 {
+            return format!("The muscle responds late: {:.2} bar are lost before it does.", 1e-5 * self.lasting);
+        }
+        let at_one_bar = self.lasting + self.lost * (-(1e5 / self.fade).powf(self.exponent)).exp();
         format!(
             "At low pressure the muscle responds late: {:.2} bar are lost at first, {:.2} bar at 1 bar.",
-            self.lost * 1e-5,
+            (self.lasting + self.lost) * 1e-5,
             at_one_bar * 1e-5
         )
     }

@@ -499,6 +499,35 @@ class EmptyingTank(WeakSupply):
         self.missing += self.taken * filled - STEP / self.refill * self.missing
 
 
+class TwoSwitches(WeakSupply):
+    """A tank that others use steadily, and the muscle as well; a compressor fills it between two switches."""
+
+    @staticmethod
+    def sizes(random, severity):
+        use = {"used": random.uniform(1.5e3, 5e3), "taken": random.uniform(0.0, 0.01)}
+        compressor = {"delivered": random.uniform(0.8e4, 3e4), "between": random.uniform(0.15e5, 0.4e5)}
+        cut = severity * random.uniform(0.25, 0.45)
+        return {"cut": cut, **use, **compressor, "begins": [*random.uniform(0.0, 1.0, 3)]}
+
+    @staticmethod
+    def in_recording(size, number):
+        return {**size, "begins": size["begins"][number]}
+
+    def begin(self, now):
+        self.missing = self.begins * self.between
+        self.running = np.zeros(len(self.between), dtype=bool)
+
+    def aim(self, now):
+        now.target[self.at] = np.minimum(now.target[self.at], self.ceiling - self.missing)
+
+    def valve(self, now, before):
+        if now.time < 0:
+            return
+        filled = np.maximum(now.p[self.at] - before[self.at], 0)
+        self.missing += self.taken * filled + STEP * (self.used - self.running * self.delivered)
+        self.running = np.where(self.missing >= self.between, True, self.running & (self.missing > 0))
+
+
 class FallingCeiling(WeakSupply):
     """Others use the same line more and more: the ceiling falls slowly."""
 
@@ -676,7 +705,7 @@ FAR = {
     "valve_dead_band": [ShutNearTarget, SoftPlay],
     "valve_gain": [KneedGain],
     "valve_offset": [SettlingZero],
-    "supply_saturation": [EmptyingTank, FallingCeiling],
+    "supply_saturation": [EmptyingTank, FallingCeiling, TwoSwitches],
     "flow_limit": [NozzleFlow, Throttle],
     "leakage": [PorousLeak, LiftingSeal],
     "contraction_sensor_offset": [SettlingPosition],
@@ -720,6 +749,7 @@ SINCE_HELD = [
     SteepFriction,
     Throttle,
     TwoMorePoles,
+    TwoSwitches,
     UnevenCreep,
     UnevenDeadTime,
 ]

@@ -425,6 +425,22 @@ class SmallTank(Plant):
         return VALVE_BANDWIDTH * (min(target, own[0]) - pressure)
 
 
+class TwoSwitches(Plant):
+    """A supply that falls from 1.9 by 0.3 bar within 3 s, and is back within 1 s; half way down at the start. The own state is the time."""
+
+    own_scales = (1.0,)
+
+    def own_start(self, x):
+        return [0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [1.0]
+
+    def pressure_rate(self, target, pressure, x, own):
+        supply = np.interp((own[0] + 1.5) % 4.0, [0.0, 3.0, 4.0], [1.9e5, 1.6e5, 1.9e5])
+        return VALVE_BANDWIDTH * (min(target, supply) - pressure)
+
+
 class SwingingZero(Plant):
     """A valve 0.12 V off, and 30 % more or less of it in 8.5 s; the own state is the time."""
 
@@ -509,6 +525,38 @@ class Counterweight(Plant):
     weighing, moving = MASS - 3.0, MASS + 3.0
 
 
+class TaperedEnds(Plant):
+    """Of the pull of the pressure 18 % are missing at full length, and 37 % of that after 40 mm."""
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x, own) - 0.18 * np.exp(-x / 0.04) * pressure * VIRTUAL_AREA_1000.area(x)
+
+
+class Rope(Plant):
+    """A rope of 15 kN/m between muscle and load, with a damper of 7.5 N s/m from 10 N on, slack where it would push.
+
+    The muscle has 1 N s/m more for its own motion relative to the load. The own state is the stretch, below zero the slack.
+    """
+
+    own_scales = (0.01,)
+
+    def own_start(self, x):
+        pressure = VALVE_GAIN * THROWS[0]
+        surplus = lambda stretch: Plant.static_force(self, pressure, x + stretch, []) - 15e3 * max(stretch, 0)
+        return [brentq(surplus, -0.3, 0.3, xtol=1e-16, rtol=1e-15)]
+
+    def loss(self, stretch):
+        return 7.5 * np.clip(15e3 * stretch / 10, 0, 1)
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        muscle = Plant.static_force(self, pressure, x + own[0], []) - DAMPING * velocity
+        return [(muscle - 15e3 * max(own[0], 0)) / (DAMPING + 1 + self.loss(own[0]))]
+
+    def force(self, pressure, x, velocity, own):
+        (rate,) = self.own_rates(None, pressure, x, velocity, own)
+        return 15e3 * max(own[0], 0) + self.loss(own[0]) * rate
+
+
 class SeriesElasticity(Plant):
     def readings(self, x, force, own):
         return x - 8e-6 * 400 * (force / 400) ** 0.85
@@ -521,7 +569,7 @@ class LaidRope(Plant):
 
 class Threshold(Plant):
     def static_force(self, pressure, x, own):
-        lost = 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5)) * (1 - 3 * x)
+        lost = 0.1e5 + 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5)) * (1 - 3 * x)
         return super().static_force(pressure - lost, x, own)
 
 
@@ -561,6 +609,7 @@ class CordFriction(Plant):
 
 
 STAIRS = staircase([0.8, 1.5, 2.0, 1.2], 1.2)
+THROWS = staircase([2.13, 1.25, 1.9, 1.1], 1.2)
 RAMPS = ramps([(0, 1.0), (0.3, 1.0), (1.5, 2.0), (2.0, 2.0), (2.6, 1.4), (3.0, 1.9), (3.6, 1.2), (4.4, 1.3), (5, 1.3)])
 
 
@@ -602,6 +651,7 @@ CASES = [
     Case("crack", Crack(), STAIRS),
     Case("lifting_seal", LiftingSeal(), STAIRS),
     Case("small_tank", SmallTank(), STAIRS),
+    Case("two_switches", TwoSwitches(), STAIRS),
     Case("swinging_zero", SwingingZero(), STAIRS),
     Case("shifting_zero", ShiftingZero(), STAIRS),
     Case("warm_by_work", WarmByWork(), STAIRS),
@@ -611,6 +661,8 @@ CASES = [
     Case("stiff_ends", StiffEnds(), STAIRS),
     Case("counterweight", Counterweight(), STAIRS),
     Case("series_elasticity", SeriesElasticity(), RAMPS),
+    Case("tapered_ends", TaperedEnds(), STAIRS),
+    Case("rope", Rope(), THROWS),
     Case("laid_rope", LaidRope(), RAMPS),
     Case("threshold", Threshold(), STAIRS),
     Case("friction", Friction(), RAMPS),
