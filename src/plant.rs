@@ -280,13 +280,14 @@ fn effects_at_start(parameters: &Parameters, at: &Point) -> [f64; Effects::STATE
 
 /// Gauge pressure in Pa at which the valve comes to rest under a command in V, with a contraction in m.
 ///
-/// A valve that rings comes to rest where one of first order does; one that opens no port near its target, where its parameter
-/// says.
+/// A valve that rings comes to rest where one of first order does, and one that shuts where it does while it regulates; one that opens no
+/// port near its target, where its parameter says.
 pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) -> f64 {
     let mut still = *parameters;
     still.effects.valve_resonance = Default::default();
     still.effects.valve_lag.second_time_constant = 0.0;
     still.effects.valve_lag.third_time_constant = 0.0;
+    still.effects.leakage.shut_after = 0.0;
     let off_target = still.effects.valve_dead_band.start * still.effects.valve_dead_band.pressure_overlap;
     still.effects.valve_dead_band.pressure_overlap = 0.0;
     let own = effects_at_start(&still, &at_rest(0.0, contraction));

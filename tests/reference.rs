@@ -181,6 +181,7 @@ fn effects_agree_with_scipy() {
                 ("leakage.opening_contraction", 0.06),
             ],
         ),
+        ("shut_at_rest", &[("leakage.rate", 0.2), ("leakage.shut_after", 0.7)]),
         ("lifting_seal", &[("leakage.rate", 0.8), ("leakage.opening_pressure", 0.9e5), ("leakage.volume_growth", 0.4)]),
         (
             "small_tank",
@@ -216,6 +217,15 @@ fn effects_agree_with_scipy() {
                 ("contraction_sensor_offset.shift", -2.4e-3),
                 ("contraction_sensor_offset.shift_time", 2.2),
                 ("contraction_sensor_offset.shift_span", 0.6),
+            ],
+        ),
+        (
+            "warm_coil",
+            &[
+                ("temperature_drift.valve_change", -0.07),
+                ("temperature_drift.time_constant", 4.0),
+                ("temperature_drift.share_2", 1.0 / 3.0),
+                ("temperature_drift.time_constant_2", 9.0),
             ],
         ),
         (
@@ -314,6 +324,27 @@ fn effects_agree_with_scipy() {
         let (contraction, pressure) = differences("dmsp-40-1000", &format!("effect_{name}.csv"), effect);
         println!("{name}: contraction within {contraction:.1e} m, pressure within {pressure:.1e} Pa");
         assert!(contraction < 1e-7 && pressure < 0.1, "{name}: {contraction} m, {pressure} Pa");
+    }
+}
+
+#[test]
+fn the_zero_of_a_sensor_drifts_as_it_warms_up() {
+    let mut parameters = Parameters::default();
+    let [newtons, pascals, time_constant] = [-30.0, 4e3, 5.0];
+    parameters.effects.temperature_drift.force_zero = newtons;
+    parameters.effects.temperature_drift.pressure_zero = pascals;
+    parameters.effects.temperature_drift.time_constant = time_constant;
+    parameters.initial.gauge_pressure = 2e5;
+    let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
+    muscle.inputs.command = 2.0;
+    muscle.initialize(0.0).unwrap();
+    for step in 0..20 {
+        let seconds = 2.0 * f64::from(step);
+        let warm = 1.0 - (-seconds / time_constant).exp();
+        let out = muscle.outputs();
+        assert!((out.measured_force - out.force - newtons * warm).abs() < 1e-9, "{seconds} s");
+        assert!((out.measured_gauge_pressure - out.gauge_pressure - pascals * warm).abs() < 1e-6, "{seconds} s");
+        muscle.advance(2.0).unwrap();
     }
 }
 

@@ -8,16 +8,23 @@ const REFERENCE_PRESSURE: f64 = 2e5;
 const TOLD_CONTRACTION: f64 = 0.15;
 /// Gauge pressure in Pa over which the last of the flow through a hole fades; not physical, it keeps the slope finite.
 const FADE: f64 = 500.0;
+/// Mean restlessness of the command in Pa up to which a valve shuts altogether, and from which it does not; and how many time constants
+/// after a usual step it is so small.
+const STILL: [f64; 2] = [500.0, 1000.0];
+const TO_REST: f64 = 7.0;
+/// Shortest time in s after which the valve shuts.
+const SHORTEST: f64 = 0.01;
 
 crate::variables::variables! {
-    /// Air that is lost while the valve goes on blowing.
+    /// Air that is lost while the valve goes on blowing, or has shut.
     ///
     /// # Model
     /// dp/dt ← dp/dt − k ((1 − c) q (q/2 bar)^(e−1) + c (p + p_a) ψ(p)) (1 + o s) / (1 + `volume_growth` x/0.1 m), q = max(p − `opening_pressure`, 0):
     /// `rate` k, `exponent` e, `choked_share` c of the leak that is a hole and not a porous wall or a seal that pressure lifts,
     /// `opening_with_contraction` o of a tear that the growing girth opens from `opening_contraction` x_o on, s = max(x − x_o, 0)/0.1 m. ψ = 1 while
     /// the flow is choked, p_a/(p + p_a) < b = 0.3, and √(1 − ((p_a/(p + p_a) − b)/(1 − b))²) above. The pressure cannot fall below
-    /// ambient.
+    /// ambient. A valve that shuts where its command K u rests does nothing else, dp/dt ← 0, while m is below 5 to 10 mbar, where
+    /// dr/dt = 7 (K u − r)/`shut_after` and dm/dt = 7 (|K u − r| − m)/`shut_after`.
     ///
     /// # In the data
     /// With the valve shut, the pressure decays; while it regulates, the pressure falls short by k p/ω and the response
@@ -44,6 +51,8 @@ crate::variables::variables! {
         opening_with_contraction: f64 = 0.0, ONE, (0.0..=100.0);
         /// Contraction from which on the hole grows
         opening_contraction: f64 = 0.0, METRE, (0.0..=0.3);
+        /// How long after a step of some bars, at rest, the valve shuts; 0 where it always regulates
+        shut_after: f64 = 0.0, SECOND, (0.0..=10.0);
     }
 }
 
@@ -56,6 +65,12 @@ fn hole(gauge_pressure: f64) -> f64 {
 }
 
 impl Leakage {
+    /// How far the valve is open, 0 to 1, while its command was restless by so many Pa.
+    fn open(&self, restlessness: f64) -> f64 {
+        let [still, moving] = STILL;
+        if self.rests() { 1.0 } else { ((restlessness - still) / (moving - still)).clamp(0.0, 1.0) }
+    }
+
     /// What is lost at a gauge pressure in Pa, in Pa: times the rate it is a loss per time.
     fn flow(&self, gauge_pressure: f64) -> f64 {
         let mut porous = (gauge_pressure - self.opening_pressure).max(0.0);
@@ -96,6 +111,7 @@ impl Effect for Leakage {
                 ("leakage.opening_with_contraction", &[50.0]),
                 ("leakage.opening_contraction", &[0.06, 0.1]),
             ],
+            &[("leakage.rate", &[0.02]), ("leakage.shut_after", &[0.5])],
         ],
         further_forms: &[],
         refinements: &[
@@ -107,12 +123,32 @@ impl Effect for Leakage {
         ],
     };
 
+    const STATE_SCALES: &'static [f64] = &[1e5, 1e5];
+
     fn is_neutral(&self) -> bool {
         self.rate == 0.0
     }
 
-    fn pressure_rate(&self, at: &Point, _own: &[f64], rate: f64) -> f64 {
-        if self.is_neutral() { rate } else { rate - self.loss(at.gauge_pressure.max(0.0), at.contraction) }
+    fn rests(&self) -> bool {
+        self.shut_after == 0.0
+    }
+
+    fn start(&self, at: &Point, own: &mut [f64]) {
+        own[0] = at.commanded_pressure;
+    }
+
+    fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
+        if !self.rests() {
+            let (way, time) = (at.commanded_pressure - own[0], self.shut_after.max(SHORTEST) / TO_REST);
+            rates.copy_from_slice(&[way / time, (way.abs() - own[1]) / time]);
+        }
+    }
+
+    fn pressure_rate(&self, at: &Point, own: &[f64], rate: f64) -> f64 {
+        if self.is_neutral() {
+            return rate;
+        }
+        self.open(own[1]) * rate - self.loss(at.gauge_pressure.max(0.0), at.contraction)
     }
 
     fn sentence(&self) -> String {

@@ -1,11 +1,12 @@
-use super::{Description, Effect, Holds};
+use super::{Description, Effect, Holds, of_recording};
+use std::fmt::Write;
 
 crate::variables::variables! {
     /// A load that is not what was entered.
     ///
     /// # Model
-    /// M ← M (1 + m) + ΔM: `additional_mass` ΔM, the same with every load (a hanger that was not weighed),
-    /// `relative_error` m of what was entered (a wrong scale). `inertia` ΔI moves along without a weight: a pulley's moment of
+    /// M ← M (1 + m) + ΔM + ΔM_k: `additional_mass` ΔM, the same with every load (a hanger that was not weighed), ΔM_k by which a load was
+    /// entered wrongly in the `second` or the `third` recording, `relative_error` m of what was entered (a wrong scale). `inertia` ΔI moves along without a weight: a pulley's moment of
     /// inertia over its radius squared, or twice a counterweight −ΔM, whose weight is taken away and whose mass moves along.
     ///
     /// # In the data
@@ -17,6 +18,12 @@ crate::variables::variables! {
     pub struct PayloadMass in "payload_mass." as Tunable {
         /// Mass beyond the entered one
         additional_mass: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
+        /// By how much more in the second of several recordings
+        second: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
+        /// By how much more in the third
+        third: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
+        /// Which of the recordings is simulated: from the fourth on as the first
+        recording: f64 = 1.0, ONE, (1.0..=1000.0);
         /// Relative error of the entered mass
         relative_error: f64 = 0.0, ONE, (-0.9..=3.0);
         /// Mass that moves along and does not weigh
@@ -28,14 +35,21 @@ impl Effect for PayloadMass {
     const DESCRIPTION: Description = Description {
         name: "payload_mass",
         meaning: "the load is not what was entered",
-        equation: "M <- M (1 + m) + dM;  weight M g, inertia M + dI",
+        equation: "M <- M (1 + m) + dM + dM_k;  weight M g, inertia M + dI",
         signature: "force residual in proportion to g + acceleration, also at rest",
         experiment: "two known masses, static and dynamic",
         reference: "thesis eq. 5.4",
         of_load: true,
         holds: Holds::Exactly,
         forms: &[&[("payload_mass.additional_mass", &[2.0, -2.0])], &[("payload_mass.relative_error", &[0.1, -0.1])]],
-        further_forms: &[],
+        further_forms: &[
+            &[("payload_mass.additional_mass", &[0.5]), ("payload_mass.second", &[2.0, -2.0])],
+            &[
+                ("payload_mass.additional_mass", &[0.5]),
+                ("payload_mass.second", &[2.0, -2.0, 0.5]),
+                ("payload_mass.third", &[0.5, 0.5, 2.0, -2.0]),
+            ],
+        ],
         refinements: &[
             ("payload_mass.additional_mass", &[0.5]),
             ("payload_mass.relative_error", &[0.02]),
@@ -44,11 +58,12 @@ impl Effect for PayloadMass {
     };
 
     fn is_neutral(&self) -> bool {
-        [self.additional_mass, self.relative_error, self.inertia] == [0.0; 3]
+        [self.additional_mass, self.second, self.third, self.relative_error, self.inertia] == [0.0; 5]
     }
 
     fn mass(&self, mass: f64) -> f64 {
-        mass * (1.0 + self.relative_error) + self.additional_mass
+        let own = of_recording(self.recording, [0.0, self.second, self.third]);
+        mass * (1.0 + self.relative_error) + self.additional_mass + own
     }
 
     fn inertia(&self, mass: f64) -> f64 {
@@ -61,10 +76,16 @@ impl Effect for PayloadMass {
         let if_any = |size: f64, text: String| if size == 0.0 { String::new() } else { text };
         let how = if self.inertia < 0.0 { "weigh and do not move" } else { "move along and do not weigh" };
         let inertia = if_any(self.inertia, format!("; {:.2} kg {how}", self.inertia.abs()));
+        let mut anew = String::new();
+        for (own, recording) in [(self.second, "second"), (self.third, "third")] {
+            if own != 0.0 {
+                let _ = write!(anew, ", {:+.2} kg in the {recording} recording", mass + own);
+            }
+        }
         if percent == 0.0 {
-            return format!("The load is {:.2} kg {} than entered{inertia}.", mass.abs(), word(mass));
+            return format!("The load is {:.2} kg {} than entered{anew}{inertia}.", mass.abs(), word(mass));
         }
         let beyond = if_any(mass, format!(", and {mass:+.2} kg"));
-        format!("The load is {:.1} % {} than entered{beyond}{inertia}.", percent.abs(), word(percent))
+        format!("The load is {:.1} % {} than entered{beyond}{anew}{inertia}.", percent.abs(), word(percent))
     }
 }

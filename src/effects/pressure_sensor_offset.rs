@@ -14,14 +14,14 @@ zero! {
     /// force follows the pressure.
     ///
     /// # Validity
-    /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
+    /// A sensor of absolute pressure is one bar off. Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
     /// once by a shock; in every recording alike, from its start, but for a constant that may be another one in each of up to three.
     ///
     /// # Reference
     /// Definition of an offset.
     pub struct PressureSensorOffset in "pressure_sensor_offset." from 1e4 {
         /// What the pressure sensor shows at ambient pressure
-        offset: PASCAL, 1e5;
+        offset: PASCAL, 2e5;
     }
 }
 

@@ -327,6 +327,16 @@ class SofterWhenWarm(HyperbolicWarmUp):
         now.force[self.at] += self.warm(now) * elastic_force(now.strain[self.at])
 
 
+class WarmCoil(HyperbolicWarmUp):
+    """The valve gives another pressure per volt as its coil warms."""
+
+    def aim(self, now):
+        now.target[self.at] *= 1 + self.warm(now)
+
+    def act(self, now):
+        pass
+
+
 # --- Valve ------------------------------------------------------------------------------------------------------------
 
 
@@ -715,7 +725,7 @@ FAR = {
     "pressure_sensor_gain": [BentPressure],
     "force_sensor_offset": [SettlingForce],
     "force_sensor_gain": [BentForce],
-    "temperature_drift": [HyperbolicWarmUp, SofterWhenWarm],
+    "temperature_drift": [HyperbolicWarmUp, SofterWhenWarm, WarmCoil],
 }
 
 # Forms that the families of the tool hold by now, or almost: named as far, they would flatter it.

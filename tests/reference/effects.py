@@ -409,6 +409,22 @@ class LiftingSeal(Plant):
         return VALVE_BANDWIDTH * (target - pressure) - 0.8 * max(pressure - 0.9e5, 0.0) / (1 + 4 * x)
 
 
+class ShutAtRest(Plant):
+    """The valve shuts when its command has differed little, of late, from the mean of what it was of late; air is lost always."""
+
+    own_scales = 1e5, 1e5
+
+    def own_start(self, x):
+        return [VALVE_GAIN * STAIRS[0], 0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(target - own[0]) / 0.1, (abs(target - own[0]) - own[1]) / 0.1]
+
+    def pressure_rate(self, target, pressure, x, own):
+        is_open = np.interp(own[1], [500, 1000], [0, 1])
+        return is_open * VALVE_BANDWIDTH * (target - pressure) - 0.2 * pressure
+
+
 class SmallTank(Plant):
     """A tank of 1.85 bar, four times as large as the muscle, is filled again within 2.5 s."""
 
@@ -480,6 +496,14 @@ class WarmByWork(Plant):
     def static_force(self, pressure, x, own):
         pull, membrane = pressure * VIRTUAL_AREA_1000.area(x), VIRTUAL_AREA_1000.elastic_force(x)
         return (1 + 0.02 * own[0]) * pull + (1 - 0.03 * own[0]) * membrane
+
+
+class WarmCoil(SwingingZero):
+    """The valve loses 7 % of its gain as its coil warms up within 4 s, a third of that within 9 s."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        lost = 0.07 * (1 - 2 / 3 * np.exp(-own[0] / 4.0) - 1 / 3 * np.exp(-own[0] / 9.0))
+        return VALVE_BANDWIDTH * ((1 - lost) * target - pressure)
 
 
 class SlowStart(Plant):
@@ -650,11 +674,13 @@ CASES = [
     Case("tear", Tear(), STAIRS),
     Case("crack", Crack(), STAIRS),
     Case("lifting_seal", LiftingSeal(), STAIRS),
+    Case("shut_at_rest", ShutAtRest(), STAIRS),
     Case("small_tank", SmallTank(), STAIRS),
     Case("two_switches", TwoSwitches(), STAIRS),
     Case("swinging_zero", SwingingZero(), STAIRS),
     Case("shifting_zero", ShiftingZero(), STAIRS),
     Case("warm_by_work", WarmByWork(), STAIRS),
+    Case("warm_coil", WarmCoil(), STAIRS),
     Case("stiffer_end", StifferEnd(), STAIRS),
     Case("slow_start", SlowStart(), STAIRS),
     Case("wrong_bore", WrongBore(), STAIRS),
