@@ -191,6 +191,7 @@ fn effects_agree_with_scipy() {
                 ("supply_saturation.recovery_time", 2.5),
             ],
         ),
+        ("soft_ceiling", &[("supply_saturation.gauge_pressure", 1.9e5), ("supply_saturation.sharpness", 7.0)]),
         (
             "two_switches",
             &[
@@ -284,6 +285,7 @@ fn effects_agree_with_scipy() {
             &[
                 ("threshold_pressure.lost", 0.6e5),
                 ("threshold_pressure.lasting", 0.1e5),
+                ("threshold_pressure.onset", 0.5e5),
                 ("threshold_pressure.fade", 0.7e5),
                 ("threshold_pressure.exponent", 1.5),
                 ("threshold_pressure.decrease_with_contraction", 0.3),

@@ -1,11 +1,14 @@
-use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, scaled};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, of_recording, scaled};
+
+/// Relative error below which nothing would be left of the muscle.
+const LEAST: f64 = -0.9;
 
 crate::variables::variables! {
     /// A muscle that is stronger or weaker as a whole.
     ///
     /// # Model
     /// F_static ← F_static (1 + g + b (F_static/400 N − 1)): `relative_error` g, `bend` b where it changes with the force. Of the
-    /// elastic force 1 + m g counts in place of 1 + g: `elastic_share` m.
+    /// elastic force 1 + m g counts in place of 1 + g: `elastic_share` m. By `second` and `third` g is more in these recordings.
     ///
     /// # In the data
     /// The force residual is in proportion to the force, whatever pressure and contraction; the motion goes with it,
@@ -22,8 +25,21 @@ crate::variables::variables! {
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Change of the gain per 400 N away from 400 N: threads that stretch
         bend: f64 = 0.0, ONE, (-0.05..=0.05);
+        /// By how much more in the second of several recordings: it ages from one to the next
+        second: f64 = 0.0, ONE, (-0.5..=0.5);
+        /// By how much more in the third
+        third: f64 = 0.0, ONE, (-0.5..=0.5);
+        /// Which of the recordings is simulated: from the fourth on as the first
+        recording: f64 = 1.0, ONE, (1.0..=1000.0);
         /// Share of the relative error that the elastic force has, too
         elastic_share: f64 = 1.0, ONE, (0.0..=1.0);
+    }
+}
+
+impl ForceGain {
+    /// Relative error in the recording that is simulated.
+    fn error(&self) -> f64 {
+        (self.relative_error + of_recording(self.recording, [0.0, self.second, self.third])).max(LEAST)
     }
 }
 
@@ -38,12 +54,19 @@ impl Effect for ForceGain {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("force_gain.relative_error", &[0.08, -0.08, 0.02, -0.02])]],
-        further_forms: &[],
+        further_forms: &[
+            &[("force_gain.relative_error", &[0.05, -0.05]), ("force_gain.second", &[-0.03])],
+            &[
+                ("force_gain.relative_error", &[0.05, -0.05]),
+                ("force_gain.second", &[-0.03]),
+                ("force_gain.third", &[-0.06]),
+            ],
+        ],
         refinements: &[("force_gain.bend", &[0.005]), ("force_gain.elastic_share", &[0.5])],
     };
 
     fn is_neutral(&self) -> bool {
-        self.relative_error == 0.0 && self.bend == 0.0
+        [self.relative_error, self.second, self.third, self.bend] == [0.0; 4]
     }
 
     fn elastic_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
@@ -51,22 +74,28 @@ impl Effect for ForceGain {
             return force;
         }
         // All of it is scaled by 1 + g after this.
-        force * (1.0 + self.elastic_share * self.relative_error) / (1.0 + self.relative_error)
+        let error = self.error();
+        force * (1.0 + self.elastic_share * error) / (1.0 + error)
     }
 
     fn static_force(&self, force: f64) -> f64 {
-        scaled(force, self.relative_error, self.bend, REFERENCE_FORCE)
+        scaled(force, self.error(), self.bend, REFERENCE_FORCE)
     }
 
     fn sentence(&self) -> String {
         let word = if self.relative_error < 0.0 { "weaker" } else { "stronger" };
         let percent = 100.0 * self.relative_error.abs();
+        let anew = [(self.second, "second"), (self.third, "third")].into_iter().filter(|(more, _)| *more != 0.0);
+        let told = |(more, recording)| {
+            format!(", {:+.1} % in the {recording} recording", 100.0 * (self.relative_error + more))
+        };
+        let anew: String = anew.map(told).collect();
         if self.elastic_share == 1.0 {
-            return format!("The muscle is {percent:.1} % {word} than nominal.");
+            return format!("The muscle is {percent:.1} % {word} than nominal{anew}.");
         }
         let of_membrane = self.elastic_share * percent;
         format!(
-            "The pull of the pressure is {percent:.1} % {word} than nominal, that of the membrane {of_membrane:.1} %."
+            "The pull of the pressure is {percent:.1} % {word} than nominal, that of the membrane {of_membrane:.1} %{anew}."
         )
     }
 }

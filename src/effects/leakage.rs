@@ -130,7 +130,7 @@ impl Effect for Leakage {
     }
 
     fn rests(&self) -> bool {
-        self.shut_after == 0.0
+        self.is_neutral() || self.shut_after == 0.0
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {

@@ -2,6 +2,8 @@ use super::{Description, Effect, Freed, Holds, Point, each_for, of_recording};
 
 /// Ceiling in Pa from which on there is none: beyond what any muscle stands.
 const NONE: f64 = 2e6;
+/// Power below which a ceiling would take off much of any pressure.
+const LEAST_SHARPNESS: f64 = 2.0;
 /// Time constant in s from which on nothing recovers.
 const FOREVER: f64 = 1e6;
 
@@ -11,8 +13,8 @@ crate::variables::variables! {
     /// # Model
     /// p_target ← p_t = min(p_target, p_s − s − d max(p_target − p, 0)), ds/dt = f + u max(p_t − p, 0) − s/τ from s = 0 at the start:
     /// `gauge_pressure` p_s of the supply at the start, its `fall` f over time, its `droop` d while it fills the muscle; `usage` u is
-    /// what filling takes from a small tank, `recovery_time` τ that of its compressor. With `rounding` r the minimum is r-soft:
-    /// p_target − r ln(1 + exp((p_target − ceiling)/r)). With a compressor between two switches p_s is the middle of a saw-tooth, which falls by
+    /// what filling takes from a small tank, `recovery_time` τ that of its compressor. With a `sharpness` n the minimum is
+    /// a soft one, p_target (1 + (p_target/ceiling)ⁿ)^(−1/n). With a compressor between two switches p_s is the middle of a saw-tooth, which falls by
     /// `span` c and is back within the share `refill` ρ of its `period` T; at the start the share `phase` φ of a period is over. In these recordings
     /// p_s is higher by `second` and `third`, and φ by `second_phase` and `third_phase`.
     ///
@@ -30,8 +32,8 @@ crate::variables::variables! {
     pub struct SupplySaturation in "supply_saturation." as Tunable {
         /// Gauge pressure of the supply, in the mean; there is no limit at the largest value
         gauge_pressure: f64 = NONE, PASCAL, (1e3..=NONE);
-        /// Pressure over which the ceiling is rounded
-        rounding: f64 = 0.0, PASCAL, (0.0..=1e5);
+        /// Power with which it sets in where it does so gradually from far below, 0 where at once
+        sharpness: f64 = 0.0, ONE, (0.0..=1000.0);
         /// Loss of supply pressure per pressure that the muscle lacks
         droop: f64 = 0.0, ONE, (0.0..=1.0);
         /// Loss of supply pressure per time, of a tank that empties or a line that others use more and more
@@ -138,7 +140,7 @@ impl Effect for SupplySaturation {
             ],
         ],
         refinements: &[
-            ("supply_saturation.rounding", &[3e3]),
+            ("supply_saturation.sharpness", &[50.0, 8.0]),
             ("supply_saturation.droop", &[0.01, 0.1]),
             ("supply_saturation.fall", &[300.0]),
             ("supply_saturation.usage", &[1.0, 5.0]),
@@ -173,11 +175,11 @@ impl Effect for SupplySaturation {
         let lost = own[0] + self.cycle(own[1]);
         let given = self.gauge_pressure + of_recording(self.recording, [0.0, self.second, self.third]);
         let ceiling = given - lost - self.droop * (target - at.gauge_pressure).max(0.0);
-        let excess = target - ceiling;
-        if self.rounding == 0.0 || excess.abs() > 40.0 * self.rounding {
+        if self.sharpness == 0.0 || target <= 0.0 || ceiling <= 0.0 {
             return target.min(ceiling);
         }
-        target - self.rounding * (excess / self.rounding).exp().ln_1p()
+        let (less, more, sharpness) = (target.min(ceiling), target.max(ceiling), self.sharpness.max(LEAST_SHARPNESS));
+        less * (1.0 + (less / more).powf(sharpness)).powf(-1.0 / sharpness)
     }
 
     fn sentence(&self) -> String {

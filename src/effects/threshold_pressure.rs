@@ -5,7 +5,8 @@ crate::variables::variables! {
     ///
     /// # Model
     /// The area feels p − l₀ − l exp(−(p/f)ᵉ) (1 − d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
-    /// `decrease_with_contraction` d; `lasting` l₀ does not fade.
+    /// `decrease_with_contraction` d; `lasting` l₀ does not fade and, with an
+    /// `onset` o, is l₀ (1 − exp(−p/o)).
     ///
     /// # In the data
     /// The force falls short at low pressure only, by the same in both directions; above a bar or two nothing is wrong.
@@ -28,6 +29,18 @@ crate::variables::variables! {
         decrease_with_contraction: f64 = 0.0, ONE, (-1.0..=1.0);
         /// Pressure that is lost at any pressure
         lasting: f64 = 0.0, PASCAL, (0.0..=4e5);
+        /// Pressure over which that sets in
+        onset: f64 = 0.0, PASCAL, (0.0..=2e5);
+    }
+}
+
+impl ThresholdPressure {
+    /// What is lost for good at a gauge pressure in Pa, Pa.
+    fn lasts(&self, gauge_pressure: f64) -> f64 {
+        if self.onset == 0.0 {
+            return self.lasting;
+        }
+        self.lasting * (1.0 - (-gauge_pressure.max(0.0) / self.onset).exp())
     }
 }
 
@@ -35,7 +48,7 @@ impl Effect for ThresholdPressure {
     const DESCRIPTION: Description = Description {
         name: "threshold_pressure",
         meaning: "pressure lost before the muscle responds, which matters at low pressure",
-        equation: "p <- max(0, p - l0 - l exp(-(p/f)^e) (1 - d x/0.1 m))",
+        equation: "p <- max(0, p - l0 (1 - exp(-p/o)) - l exp(-(p/f)^e) (1 - d x/0.1 m))",
         signature: "force falls short at low pressure only, the same in both directions",
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
@@ -49,7 +62,10 @@ impl Effect for ThresholdPressure {
                 ("threshold_pressure.exponent", &[4.0]),
             ],
         ],
-        further_forms: &[&[("threshold_pressure.lasting", &[0.3e5])]],
+        further_forms: &[
+            &[("threshold_pressure.lasting", &[0.3e5])],
+            &[("threshold_pressure.lasting", &[0.3e5]), ("threshold_pressure.onset", &[0.3e5])],
+        ],
         refinements: &[
             ("threshold_pressure.exponent", &[1.5, 2.5]),
             ("threshold_pressure.decrease_with_contraction", &[0.2]),
@@ -68,7 +84,7 @@ impl Effect for ThresholdPressure {
         let power = if self.exponent == 1.0 { relative } else { relative.powf(self.exponent) };
         let contracted = 1.0 - self.decrease_with_contraction * at.relative_contraction();
         // A pressure that was negative before is no business of this effect.
-        let lost = self.lasting + self.lost * (-power).exp() * contracted.max(0.0);
+        let lost = self.lasts(at.gauge_pressure) + self.lost * (-power).exp() * contracted.max(0.0);
         (pressure - lost).max(pressure.min(0.0))
     }
 
@@ -76,10 +92,10 @@ impl Effect for ThresholdPressure {
         if self.lost == 0.0 {
             return format!("The muscle responds late: {:.2} bar are lost before it does.", 1e-5 * self.lasting);
         }
-        let at_one_bar = self.lasting + self.lost * (-(1e5 / self.fade).powf(self.exponent)).exp();
+        let at_one_bar = self.lasts(1e5) + self.lost * (-(1e5 / self.fade).powf(self.exponent)).exp();
         format!(
             "At low pressure the muscle responds late: {:.2} bar are lost at first, {:.2} bar at 1 bar.",
-            (self.lasting + self.lost) * 1e-5,
+            (self.lasts(0.0) + self.lost) * 1e-5,
             at_one_bar * 1e-5
         )
     }

@@ -441,6 +441,14 @@ class SmallTank(Plant):
         return VALVE_BANDWIDTH * (min(target, own[0]) - pressure)
 
 
+class SoftCeiling(Plant):
+    """A supply of 1.9 bar that falls short by and by."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        given = 1 / ((1 / target) ** 7 + (1 / 1.9e5) ** 7) ** (1 / 7)
+        return VALVE_BANDWIDTH * (given - pressure)
+
+
 class TwoSwitches(Plant):
     """A supply that falls from 1.9 by 0.3 bar within 3 s, and is back within 1 s; half way down at the start. The own state is the time."""
 
@@ -593,7 +601,7 @@ class LaidRope(Plant):
 
 class Threshold(Plant):
     def static_force(self, pressure, x, own):
-        lost = 0.1e5 + 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5)) * (1 - 3 * x)
+        lost = 0.1e5 * (1 - np.exp(-pressure / 0.5e5)) + 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5)) * (1 - 3 * x)
         return super().static_force(pressure - lost, x, own)
 
 
@@ -676,6 +684,7 @@ CASES = [
     Case("lifting_seal", LiftingSeal(), STAIRS),
     Case("shut_at_rest", ShutAtRest(), STAIRS),
     Case("small_tank", SmallTank(), STAIRS),
+    Case("soft_ceiling", SoftCeiling(), STAIRS),
     Case("two_switches", TwoSwitches(), STAIRS),
     Case("swinging_zero", SwingingZero(), STAIRS),
     Case("shifting_zero", ShiftingZero(), STAIRS),
