@@ -1,6 +1,6 @@
 //! Zeros of sensors and of the valve, which need not stay where they are while one records.
 
-use crate::effects::{each_for, of_recording};
+use crate::effects::{each_for, of_recording, told_anew};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
@@ -36,8 +36,7 @@ impl Course {
         let (settling, constant) = self.settling;
         let (swing, period, phase) = self.swing;
         let (shift, middle, lasts) = self.shift;
-        let [second, third] = self.anew;
-        let mut zero = self.offset + of_recording(self.recording, [0.0, second, third]);
+        let mut zero = self.offset + of_recording(self.recording, self.anew);
         if settling != 0.0 {
             zero += settling * (-time / constant).exp();
         }
@@ -74,13 +73,10 @@ impl Course {
         let (settling, constant) = self.settling;
         let (swing, period, _) = self.swing;
         let (shift, middle, _) = self.shift;
-        let mut told = String::new();
         let shows = |value: f64| amount(value).contains(|digit: char| ('1'..='9').contains(&digit));
-        for (own, recording) in self.anew.into_iter().zip(["second", "third"]) {
-            if shows(own) {
-                let _ = write!(told, ", {} in the {recording} recording", amount(self.offset + own));
-            }
-        }
+        let anew = |own, recording: &str| format!(", {} in the {recording} recording", amount(self.offset + own));
+        let mut told =
+            told_anew(self.anew, |own, recording| if shows(own) { anew(own, recording) } else { String::new() });
         if shows(settling) {
             let _ = write!(told, ", {} on top at the start, which settles within {constant:.1} s", amount(settling));
         }

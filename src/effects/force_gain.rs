@@ -1,4 +1,4 @@
-use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, of_recording, scaled};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, of_recording, scaled, told_anew};
 
 /// Relative error below which nothing would be left of the muscle.
 const LEAST: f64 = -0.9;
@@ -39,7 +39,7 @@ crate::variables::variables! {
 impl ForceGain {
     /// Relative error in the recording that is simulated.
     fn error(&self) -> f64 {
-        (self.relative_error + of_recording(self.recording, [0.0, self.second, self.third])).max(LEAST)
+        (self.relative_error + of_recording(self.recording, [self.second, self.third])).max(LEAST)
     }
 }
 
@@ -85,11 +85,9 @@ impl Effect for ForceGain {
     fn sentence(&self) -> String {
         let word = if self.relative_error < 0.0 { "weaker" } else { "stronger" };
         let percent = 100.0 * self.relative_error.abs();
-        let anew = [(self.second, "second"), (self.third, "third")].into_iter().filter(|(more, _)| *more != 0.0);
-        let told = |(more, recording)| {
+        let anew = told_anew([self.second, self.third], |more, recording| {
             format!(", {:+.1} % in the {recording} recording", 100.0 * (self.relative_error + more))
-        };
-        let anew: String = anew.map(told).collect();
+        });
         if self.elastic_share == 1.0 {
             return format!("The muscle is {percent:.1} % {word} than nominal{anew}.");
         }

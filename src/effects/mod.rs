@@ -61,14 +61,19 @@ fn unscaled(reading: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
     2.0 * reading / (slope + (slope * slope + 4.0 * bend / middle * reading).max(0.0).sqrt())
 }
 
-/// A value that may be another one in each of three recordings, in the one with a number from 1; in further ones it is the first.
-pub(crate) fn of_recording(number: f64, values: [f64; 3]) -> f64 {
-    let [first, second, third] = values;
+/// By how much a value is more in the recording with a number from 1, given that for the second and the third; in all others by nothing.
+pub(crate) fn of_recording(number: f64, [second, third]: [f64; 2]) -> f64 {
     match number.round() {
         2.0 => second,
         3.0 => third,
-        _ => first,
+        _ => 0.0,
     }
+}
+
+/// What is told of a second and a third recording where their values are not zero, by `told` from a value and the recording's name.
+pub(crate) fn told_anew(values: [f64; 2], told: impl Fn(f64, &str) -> String) -> String {
+    let named = values.into_iter().zip(["second", "third"]).filter(|(value, _)| *value != 0.0);
+    named.map(|(value, recording)| told(value, recording)).collect()
 }
 
 /// What the sensors show.

@@ -1,5 +1,4 @@
-use super::{Description, Effect, Holds, of_recording};
-use std::fmt::Write;
+use super::{Description, Effect, Holds, of_recording, told_anew};
 
 crate::variables::variables! {
     /// A load that is not what was entered.
@@ -62,7 +61,7 @@ impl Effect for PayloadMass {
     }
 
     fn mass(&self, mass: f64) -> f64 {
-        let own = of_recording(self.recording, [0.0, self.second, self.third]);
+        let own = of_recording(self.recording, [self.second, self.third]);
         mass * (1.0 + self.relative_error) + self.additional_mass + own
     }
 
@@ -76,12 +75,9 @@ impl Effect for PayloadMass {
         let if_any = |size: f64, text: String| if size == 0.0 { String::new() } else { text };
         let how = if self.inertia < 0.0 { "weigh and do not move" } else { "move along and do not weigh" };
         let inertia = if_any(self.inertia, format!("; {:.2} kg {how}", self.inertia.abs()));
-        let mut anew = String::new();
-        for (own, recording) in [(self.second, "second"), (self.third, "third")] {
-            if own != 0.0 {
-                let _ = write!(anew, ", {:+.2} kg in the {recording} recording", mass + own);
-            }
-        }
+        let anew = told_anew([self.second, self.third], |own, recording| {
+            format!(", {:+.2} kg in the {recording} recording", mass + own)
+        });
         if percent == 0.0 {
             return format!("The load is {:.2} kg {} than entered{anew}{inertia}.", mass.abs(), word(mass));
         }

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Freed, Holds, Point, each_for, of_recording};
+use super::{Description, Effect, Freed, Holds, Point, each_for, of_recording, told_anew};
 
 /// Ceiling in Pa from which on there is none: beyond what any muscle stands.
 const NONE: f64 = 2e6;
@@ -86,7 +86,7 @@ const REFILL: Freed = ("supply_saturation.refill", &[0.2]);
 impl SupplySaturation {
     /// What a compressor's switching takes off the supply at a time in s since the start, Pa.
     fn cycle(&self, time: f64) -> f64 {
-        let phase = self.phase + of_recording(self.recording, [0.0, self.second_phase, self.third_phase]);
+        let phase = self.phase + of_recording(self.recording, [self.second_phase, self.third_phase]);
         let passed = (time / self.period + phase).rem_euclid(1.0);
         let emptying = 1.0 - self.refill;
         self.span * (if passed < emptying { passed / emptying } else { (1.0 - passed) / self.refill } - 0.5)
@@ -173,7 +173,7 @@ impl Effect for SupplySaturation {
             return target;
         }
         let lost = own[0] + self.cycle(own[1]);
-        let given = self.gauge_pressure + of_recording(self.recording, [0.0, self.second, self.third]);
+        let given = self.gauge_pressure + of_recording(self.recording, [self.second, self.third]);
         let ceiling = given - lost - self.droop * (target - at.gauge_pressure).max(0.0);
         if self.sharpness == 0.0 || target <= 0.0 || ceiling <= 0.0 {
             return target.min(ceiling);
@@ -203,9 +203,9 @@ impl Effect for SupplySaturation {
             format!("; its compressor makes that ±{:.2} bar, each {:.1} s", 0.5e-5 * self.span, self.period)
         };
         let bar = |more: f64| format!("{:.2} bar", 1e-5 * (self.gauge_pressure + more));
-        let anew = [(self.second, "second"), (self.third, "third")].into_iter().filter(|(more, _)| *more != 0.0);
-        let anew: String =
-            anew.map(|(more, recording)| format!(", {} in the {recording} recording", bar(more))).collect();
+        let anew = told_anew([self.second, self.third], |more, recording| {
+            format!(", {} in the {recording} recording", bar(more))
+        });
         format!("The supply gives no more than {}{anew}{falling}{taken}{made_up}{cycle}.", bar(0.0))
     }
 }

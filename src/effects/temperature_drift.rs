@@ -1,5 +1,4 @@
-use super::{Description, Effect, Holds, Point, Readings, of_recording};
-use std::fmt::Write;
+use super::{Description, Effect, Holds, Point, Readings, of_recording, told_anew};
 
 /// Power in W of the motion for which changes by work are stated.
 const REFERENCE_POWER: f64 = 10.0;
@@ -79,7 +78,7 @@ impl TemperatureDrift {
     }
 
     fn warmth_at_start(&self) -> f64 {
-        of_recording(self.recording, [0.0, self.second, self.third])
+        of_recording(self.recording, [self.second, self.third])
     }
 
     /// Warmth of a sensor at a time in s since the start: it does no work.
@@ -195,13 +194,9 @@ impl Effect for TemperatureDrift {
             ),
         ];
         let parts: Vec<_> = parts.into_iter().filter_map(|(is_there, part)| is_there.then_some(part)).collect();
-        let mut told =
-            format!("Warming up within {:.0} s{slowly}{by_work} changes {}", self.time_constant, parts.join(", "));
-        for (warm, recording) in [(self.second, "second"), (self.third, "third")] {
-            if warm > 0.0 {
-                let _ = write!(told, "; the {recording} recording starts {:.0} % warm", 100.0 * warm);
-            }
-        }
-        told + "."
+        let anew = told_anew([self.second, self.third], |warm, recording| {
+            format!("; the {recording} recording starts {:.0} % warm", 100.0 * warm)
+        });
+        format!("Warming up within {:.0} s{slowly}{by_work} changes {}{anew}.", self.time_constant, parts.join(", "))
     }
 }

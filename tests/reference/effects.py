@@ -449,8 +449,8 @@ class SoftCeiling(Plant):
         return VALVE_BANDWIDTH * (given - pressure)
 
 
-class TwoSwitches(Plant):
-    """A supply that falls from 1.9 by 0.3 bar within 3 s, and is back within 1 s; half way down at the start. The own state is the time."""
+class Timed(Plant):
+    """The own state is the time."""
 
     own_scales = (1.0,)
 
@@ -459,32 +459,26 @@ class TwoSwitches(Plant):
 
     def own_rates(self, target, pressure, x, velocity, own):
         return [1.0]
+
+
+class TwoSwitches(Timed):
+    """A supply that falls from 1.9 by 0.3 bar within 3 s, and is back within 1 s; half way down at the start."""
 
     def pressure_rate(self, target, pressure, x, own):
         supply = np.interp((own[0] + 1.5) % 4.0, [0.0, 3.0, 4.0], [1.9e5, 1.6e5, 1.9e5])
         return VALVE_BANDWIDTH * (min(target, supply) - pressure)
 
 
-class SwingingZero(Plant):
-    """A valve 0.12 V off, and 30 % more or less of it in 8.5 s; the own state is the time."""
-
-    own_scales = (1.0,)
-
-    def own_start(self, x):
-        return [0.0]
-
-    def own_rates(self, target, pressure, x, velocity, own):
-        return [1.0]
+class SwingingZero(Timed):
+    """A valve 0.12 V off, and 30 % more or less of it in 8.5 s."""
 
     def pressure_rate(self, target, pressure, x, own):
         volts = 0.12 + 0.036 * np.sin(2 * np.pi / 8.5 * own[0] + 0.7)
         return VALVE_BANDWIDTH * (target + VALVE_GAIN * volts - pressure)
 
 
-class ShiftingZero(SwingingZero):
-    """A position sensor 4 mm off that slips back by 2.4 mm from 1.9 s to 2.5 s; the own state is the time."""
-
-    pressure_rate = Plant.pressure_rate
+class ShiftingZero(Timed):
+    """A position sensor 4 mm off that slips back by 2.4 mm from 1.9 s to 2.5 s."""
 
     def readings(self, x, force, own):
         return x + np.interp(own[:, 0], [1.9, 2.5], [4e-3, 1.6e-3])
@@ -506,7 +500,7 @@ class WarmByWork(Plant):
         return (1 + 0.02 * own[0]) * pull + (1 - 0.03 * own[0]) * membrane
 
 
-class WarmCoil(SwingingZero):
+class WarmCoil(Timed):
     """The valve loses 7 % of its gain as its coil warms up within 4 s, a third of that within 9 s."""
 
     def pressure_rate(self, target, pressure, x, own):
