@@ -262,15 +262,41 @@ impl Recording {
     /// The recording with an instant more in the middle between any two samples, where each signal is on the cubic through the
     /// two samples before and after, its gaps bridged.
     pub fn doubled(&self) -> Self {
-        let doubled = |values: &[f64]| -> Vec<f64> {
-            let middle = |k: usize| self.halfway(values, k);
+        self.with_middles(|_, values, k| self.halfway(values, k))
+    }
+
+    /// The same along straight lines, but for jumps of the command: these are over in the middle between their samples, or else
+    /// begin there. A jump is a change that is more than twice as large as those before and after.
+    pub fn with_jumps(&self, early: bool) -> Self {
+        let change = |values: &[f64], k: usize| (values[k + 1] - values[k]).abs();
+        let jumps = |values: &[f64], k: usize| {
+            let before = if k > 0 { change(values, k - 1) } else { 0.0 };
+            let after = if k + 2 < values.len() { change(values, k + 1) } else { 0.0 };
+            change(values, k) > 2.0 * before.max(after)
+        };
+        self.with_middles(|signal, values, k| {
+            if signal == Signal::Command && jumps(values, k) {
+                values[if early { k + 1 } else { k }]
+            } else {
+                0.5 * (values[k] + values[k + 1])
+            }
+        })
+    }
+
+    /// The recording with an instant more in the middle between any two samples; what a signal is there is told by its values, their
+    /// gaps bridged, and the position of the first of both.
+    fn with_middles(&self, middle: impl Fn(Signal, &[f64], usize) -> f64) -> Self {
+        let doubled = |values: &[f64], middle: &dyn Fn(&[f64], usize) -> f64| -> Vec<f64> {
             (0..values.len())
-                .flat_map(|k| [Some(values[k]), (k + 1 < values.len()).then(|| middle(k))])
+                .flat_map(|k| [Some(values[k]), (k + 1 < values.len()).then(|| middle(values, k))])
                 .flatten()
                 .collect()
         };
-        let signals = self.signals.keys().filter_map(|signal| Some((*signal, doubled(&self.bridged(*signal)?))));
-        Self { time: doubled(&self.time), lines: Vec::new(), signals: signals.collect(), ..self.clone() }
+        let signals = self.signals.keys().filter_map(|signal| {
+            Some((*signal, doubled(&self.bridged(*signal)?, &|values, k| middle(*signal, values, k))))
+        });
+        let time = doubled(&self.time, &|time, k| 0.5 * (time[k] + time[k + 1]));
+        Self { time, lines: Vec::new(), signals: signals.collect(), ..self.clone() }
     }
 
     /// Value of the cubic through four neighbours in the middle between the second, `sample`, and the third; of the straight

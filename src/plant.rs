@@ -22,6 +22,9 @@ const SOURCE: &str = "Master thesis \u{201c}Comparative Assessment and Improveme
 
 /// Stiffness of what stretches, times this time in s, is how it damps: without mass and loss it would be infinitely fast.
 const LOSS_TIME: f64 = 5e-4;
+/// Time in s that the muscle, damped itself, takes at least to follow what is stiff: what damps more then moves nothing by as much as
+/// sensors show, and small steps would be taken for nothing.
+const FOLLOWING_TIME: f64 = 2e-3;
 /// Pull in N from which on it does: where it becomes slack, nothing jumps.
 const TAUT: f64 = 10.0;
 /// Slack in m that is more than any muscle is long.
@@ -128,7 +131,8 @@ fn stretched(parameters: &Parameters, at: &Point, own: &[f64], tension: f64) -> 
         tension_rate,
         ..*at
     };
-    let loss = LOSS_TIME * (tension / TAUT).clamp(0.0, 1.0);
+    let loss_time = LOSS_TIME.max(FOLLOWING_TIME - compliance * parameters.muscle.damping);
+    let loss = loss_time * (tension / TAUT).clamp(0.0, 1.0);
     let passed_on = |rate: f64| tension.max(0.0) + loss * rate;
     let of_muscle = |rate: f64| muscle_force(parameters, &point(rate), own) - LEAST_DAMPING * compliance * rate;
     let lack = |rate: f64| of_muscle(rate) - passed_on(rate);
@@ -279,17 +283,8 @@ fn effects_at_start(parameters: &Parameters, at: &Point) -> [f64; Effects::STATE
 }
 
 /// Gauge pressure in Pa at which the valve comes to rest under a command in V, with a contraction in m.
-///
-/// A valve that rings comes to rest where one of first order does, and one that shuts where it does while it regulates; one that opens no
-/// port near its target, where its parameter says.
 pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) -> f64 {
-    let mut still = *parameters;
-    still.effects.valve_resonance = Default::default();
-    still.effects.valve_lag.second_time_constant = 0.0;
-    still.effects.valve_lag.third_time_constant = 0.0;
-    still.effects.leakage.shut_after = 0.0;
-    let off_target = still.effects.valve_dead_band.start * still.effects.valve_dead_band.pressure_overlap;
-    still.effects.valve_dead_band.pressure_overlap = 0.0;
+    let still = Parameters { effects: parameters.effects.at_rest(), ..*parameters };
     let own = effects_at_start(&still, &at_rest(0.0, contraction));
     let rate = |pressure: f64| {
         let at = with_target(&still, command, at_rest(pressure, contraction), &own);
@@ -297,7 +292,7 @@ pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) 
     };
     let highest = 1e5 + commanded_pressure(&still, command, &at_rest(0.0, contraction), &own);
     let target = if rate(0.0) <= 0.0 { 0.0 } else { bisect(rate, 0.0, highest) };
-    (target + off_target).max(0.0)
+    (target + parameters.effects.rests_off()).max(0.0)
 }
 
 /// Gauge pressure in Pa at which a weight in N hangs still at a contraction in m; see [`ForceModels::holding_pressure`].

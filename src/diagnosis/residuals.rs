@@ -44,6 +44,8 @@ pub struct Data<'a> {
     held_out_from: Vec<f64>,
     segments: Vec<Segment>,
     noise: BTreeMap<Signal, Noise>,
+    /// Per residual, the error in SI that a jump of the command leaves since its instant between two samples is not known.
+    mistimed: Vec<f64>,
     tolerance: f64,
     /// Tolerance of the integration, see [`integrator::advance`].
     pub integration: f64,
@@ -58,6 +60,8 @@ pub struct Loss {
     pub samples: usize,
     /// Mean square relative to that of the noise.
     pub excess: f64,
+    /// The same where what jumps of the command leave between their samples may be, too.
+    pub doubtless: f64,
     /// Mean square that the structural error of a sound nominal model makes, relative to that of the noise.
     pub structure: f64,
     /// Number of samples that are worth an independent one, judged from how these residuals hang together.
@@ -75,6 +79,13 @@ pub enum Scope {
     HeldOut,
 }
 
+impl Scope {
+    /// The samples that are not among these; for all of them the ones that no fit saw.
+    pub fn others(self) -> Self {
+        if self == Self::HeldOut { Self::Training } else { Self::HeldOut }
+    }
+}
+
 impl<'a> Data<'a> {
     /// Looks at recordings before any fit.
     ///
@@ -90,6 +101,7 @@ impl<'a> Data<'a> {
             held_out_from: last_part(recordings),
             segments: segments(recordings, nominal)?,
             noise: BTreeMap::new(),
+            mistimed: Vec::new(),
             tolerance,
             integration: integrator::TOLERANCE,
         };
@@ -107,6 +119,7 @@ impl<'a> Data<'a> {
         if let Some(residuals) = data.residuals(nominal) {
             data.noise = data.noise_in(&residuals);
         }
+        data.mistimed = data.mistiming(nominal).unwrap_or_else(|| vec![0.0; data.count()]);
         Ok(data)
     }
 
@@ -207,11 +220,27 @@ impl<'a> Data<'a> {
         Some(cubics.iter().zip(residuals).map(|(cubic, line)| cubic - line).collect())
     }
 
+    /// Half of what it makes of a difference to the residuals of a model whether jumps of the command come a quarter of a sampling
+    /// interval earlier or later than the middle between their samples: a quarter is about the deviation if all instants there are as likely.
+    fn mistiming(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+        let jumping = |early: bool| {
+            let recordings: Vec<Recording> =
+                self.recordings.iter().map(|recording| recording.with_jumps(early)).collect();
+            self.residuals_on(&recordings, 2, parameters)
+        };
+        Some(jumping(true)?.iter().zip(jumping(false)?).map(|(early, late)| 0.5 * (early - late).abs()).collect())
+    }
+
+    /// Number of residuals.
+    fn count(&self) -> usize {
+        self.segments.last().map_or(0, |segment| segment.range.end)
+    }
+
     /// Residuals of simulations on recordings whose `every`-th samples are those of this data.
     fn residuals_on(&self, recordings: &[Recording], every: usize, parameters: &Parameters) -> Option<Vec<f64>> {
         let replayed = |recording| replay_within(parameters, recording, self.integration).ok();
         let replays: Vec<_> = recordings.par_iter().map(replayed).collect::<Option<_>>()?;
-        let mut all = Vec::with_capacity(self.segments.last().map_or(0, |segment| segment.range.end));
+        let mut all = Vec::with_capacity(self.count());
         for segment in &self.segments {
             let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);
             all.extend(segment.samples.iter().map(|&k| measured[k] - simulated[every * k]));
@@ -236,23 +265,22 @@ impl<'a> Data<'a> {
 
     /// How large residuals are, per signal and recording.
     pub fn losses(&self, residuals: &[f64], scope: Scope) -> Vec<Loss> {
-        let in_scope = self.segments.iter().map(|segment| {
+        let of_segment = |segment: &Segment| {
             let level = self.noise[&segment.signal].level;
-            let both = segment.samples.iter().zip(&residuals[segment.range.clone()]);
-            let scaled: Vec<f64> =
-                both.filter(|(k, _)| self.is_in(scope, segment, **k)).map(|(_, residual)| residual / level).collect();
-            (segment, scaled)
-        });
-        in_scope
-            .filter(|(_, scaled)| !scaled.is_empty())
-            .map(|(segment, scaled)| Loss {
+            let in_scope =
+                segment.samples.iter().zip(segment.range.clone()).filter(|(k, _)| self.is_in(scope, segment, **k));
+            let (scaled, doubtless): (Vec<f64>, Vec<f64>) =
+                in_scope.map(|(_, at)| (residuals[at] / level, residuals[at] / level.hypot(self.mistimed[at]))).unzip();
+            (!scaled.is_empty()).then(|| Loss {
                 signal: segment.signal,
                 samples: scaled.len(),
                 excess: mean_square(&scaled),
+                doubtless: mean_square(&doubtless),
                 structure: self.structure(segment.signal),
                 effective: effective_samples(&scaled, self.recordings[segment.recording].period()),
             })
-            .collect()
+        };
+        self.segments.iter().filter_map(of_segment).collect()
     }
 
     /// Logarithm of the likelihood of residuals, up to a constant, if they hang together no longer than the noise does.

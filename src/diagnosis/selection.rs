@@ -113,12 +113,13 @@ fn gain(without: &[Loss], with: &[Loss]) -> f64 {
     without.iter().zip(with).map(|(b, a)| 0.5 * a.effective * ratio(b, a).ln()).sum()
 }
 
-/// Mean squared residual per signal beyond that of the noise, relative to it.
+/// Mean squared residual per signal beyond that of the noise, relative to it; what may come from between the samples of the command is
+/// none.
 fn beyond_noise(losses: &[Loss]) -> BTreeMap<Signal, f64> {
     let mut sums: BTreeMap<Signal, (f64, f64)> = BTreeMap::new();
     for loss in losses {
         let (sum, count) = sums.entry(loss.signal).or_default();
-        *sum += loss.excess * loss.samples as f64;
+        *sum += loss.doubtless * loss.samples as f64;
         *count += loss.samples as f64;
     }
     sums.into_iter().map(|(signal, (sum, count))| (signal, (sum / count - 1.0).max(0.0))).collect()
@@ -334,6 +335,11 @@ impl<'a, 'b> Search<'a, 'b> {
     /// last.
     fn in_best_form(&self, judged: Judged) -> Judged {
         let refined = self.finished_refined(judged.clone(), |judged| self.refined(judged));
+        self.in_better_form(judged, refined)
+    }
+
+    /// The best of a hypothesis that is refined in all its effects, and of what it is further refined and in other forms of its last.
+    fn in_better_form(&self, judged: Judged, refined: Judged) -> Judged {
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;
         }
@@ -481,7 +487,18 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut exchanged: Vec<Judged> = without.iter().flat_map(exchange).collect();
         exchanged.retain(|judged| !next.iter().any(|known| same_effects(known, judged) && known.score >= judged.score));
         next.extend(self.worth_refining(level, exchanged));
-        each_once(next)
+        self.rivals_in_best_form(each_once(next))
+    }
+
+    /// Hypotheses of several effects, those that a form may keep from rivalling the best in other forms of their last.
+    fn rivals_in_best_form(&self, level: Vec<Judged>) -> Vec<Judged> {
+        let best = possible(&level).filter(|best| self.may_be_form(&best.fitted.losses));
+        let Some(best) = best.map(|best| best.fitted.hypothesis.names()) else { return level };
+        let lacks_form =
+            |judged: &Judged| judged.explained > LEAST_EXPLAINED_EXACTLY.0 && judged.fitted.hypothesis.names() != best;
+        let (close, rest): (Vec<_>, Vec<_>) = level.into_iter().partition(lacks_form);
+        let close = close.into_par_iter().map(|judged| self.in_better_form(judged.clone(), judged));
+        sorted(close.chain(rest).collect())
     }
 
     /// Of hypotheses those that may be worth more effects than a level has, each once, refined, the best first.
@@ -553,7 +570,7 @@ impl<'a, 'b> Search<'a, 'b> {
         if parts.len() < 2 {
             return judged;
         }
-        let fewer = parts.par_iter().filter_map(|part| self.without(&judged, part));
+        let fewer = parts.par_iter().filter_map(|part| self.without(&judged, part)).filter(is_possible);
         match fewer.max_by(|a, b| a.score.total_cmp(&b.score)) {
             Some(fewer) if !self.is_worth(&fewer, &judged) => self.pruned(fewer),
             _ => judged,
@@ -600,17 +617,18 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     /// A hypothesis fitted to the samples that fits may see, and whether it foretells the others; or, where these tell too little,
-    /// as it was fitted to all. `None` where neither will do.
+    /// as it was fitted to all: they cannot tell it from their own best, or are foretold by a fit to the others. `None` where neither will
+    /// do.
     fn foretelling(&self, told: Judged) -> Option<(Fitted, bool)> {
-        let model = self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, Scope::Training)?;
-        if model.hypothesis.is_impossible(&model.parameters) {
-            return None;
-        }
-        if self.holds(&model)? && !self.bench.shows_late(&model) {
+        let seeing = |seen| self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, seen);
+        let model = seeing(Scope::Training)?;
+        let may_be = !model.hypothesis.is_impossible(&model.parameters);
+        if may_be && self.holds(&model, Scope::Training)? && !self.bench.shows_late(&model) {
             return Some((model, true));
         }
-        let holds = self.is_as_good_in_training(&told.fitted, &model) && self.holds(&told.fitted)?;
-        holds.then_some((told.fitted, false))
+        let later = || self.holds(&seeing(Scope::HeldOut)?, Scope::HeldOut);
+        let tells_too_little = may_be && self.is_as_good_in_training(&told.fitted, &model) || later()?;
+        (tells_too_little && self.holds(&told.fitted, Scope::Training)?).then_some((told.fitted, false))
     }
 
     /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
@@ -663,11 +681,11 @@ impl<'a, 'b> Search<'a, 'b> {
         !self.shows(&seen(fitted), &seen(trained))
     }
 
-    /// Whether a hypothesis that was fitted to the samples that fits may see does better on those that they may not.
-    fn holds(&self, trained: &Fitted) -> Option<bool> {
+    /// Whether a hypothesis that was fitted to samples does better on all others.
+    fn holds(&self, trained: &Fitted, seen: Scope) -> Option<bool> {
         let Fitted { hypothesis, parameters, .. } = &self.baseline;
-        let baseline = self.bench.exact_fit(hypothesis, parameters, Scope::Training)?;
-        let unseen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, Scope::HeldOut);
+        let baseline = self.bench.exact_fit(hypothesis, parameters, seen)?;
+        let unseen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, seen.others());
         let (without, with) = (unseen(&baseline), unseen(trained));
         let explained = explained(&without, &with, &self.bench.data);
         Some(gain(&without, &with) > 0.0 && explained > least_explained(trained).1)

@@ -133,6 +133,11 @@ impl Effect for Leakage {
         self.is_neutral() || self.shut_after == 0.0
     }
 
+    /// It comes to rest where it does while it regulates.
+    fn at_rest(self) -> Self {
+        Self { shut_after: 0.0, ..self }
+    }
+
     fn start(&self, at: &Point, own: &mut [f64]) {
         own[0] = at.commanded_pressure;
     }

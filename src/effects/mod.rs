@@ -179,6 +179,14 @@ pub trait Effect: Declared + Default {
     fn in_recording(&mut self, number: f64) {
         self.visit_mut(&mut |variable, old| if variable.name.ends_with(".recording") { number } else { old });
     }
+    /// Without what it does only while the valve moves.
+    fn at_rest(self) -> Self {
+        self
+    }
+    /// Gauge pressure in Pa by which the valve rests off its target.
+    fn rests_off(&self) -> f64 {
+        0.0
+    }
     /// What it does at a time in s since the start whatever the muscle does, where it goes its own way over time; SI.
     fn own_course(&self, _time: f64) -> f64 {
         0.0
@@ -341,6 +349,16 @@ macro_rules! effects {
             pub fn in_recording(&mut self, number: usize) {
                 let number = number as f64;
                 $(self.$field.in_recording(number);)*
+            }
+
+            /// All effects without what they do only while the valve moves.
+            pub fn at_rest(self) -> Self {
+                Self { $($field: self.$field.at_rest(),)* }
+            }
+
+            /// Gauge pressure in Pa by which the valve rests off its target.
+            pub fn rests_off(&self) -> f64 {
+                0.0 $(+ self.$field.rests_off())*
             }
 
             /// What the effect with this name does at a time in s since the start whatever the muscle does; SI.

@@ -87,6 +87,15 @@ impl Effect for ValveDeadBand {
         self.play == 0.0 && self.stiction == 0.0 && self.pressure_overlap == 0.0
     }
 
+    /// A valve that opens no port near its target rests where it started.
+    fn at_rest(self) -> Self {
+        Self { pressure_overlap: 0.0, ..self }
+    }
+
+    fn rests_off(&self) -> f64 {
+        self.start * self.pressure_overlap
+    }
+
     fn slack(&self) -> Slack {
         let Self { play, play_spread, stiction, jump_time, sliding_speed, start, .. } = *self;
         Slack { play, play_spread, stiction, jump_time, sliding_speed, start }

@@ -68,6 +68,11 @@ impl Effect for ValveLag {
         self.time_constant == 0.0 && self.second_time_constant == 0.0 && self.third_time_constant == 0.0
     }
 
+    /// Delays before the valve end where they began.
+    fn at_rest(self) -> Self {
+        Self { second_time_constant: 0.0, third_time_constant: 0.0, ..self }
+    }
+
     fn start(&self, at: &Point, own: &mut [f64]) {
         own.fill(at.gauge_pressure);
     }

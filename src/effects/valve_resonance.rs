@@ -82,6 +82,11 @@ impl Effect for ValveResonance {
         self.natural_frequency == 0.0
     }
 
+    /// A valve that rings comes to rest where one of first order does.
+    fn at_rest(self) -> Self {
+        Self::default()
+    }
+
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let (frequency, rate) = (self.natural_frequency, self.pilot_rate(at, own));
         let mut error = self.error(at, own);

@@ -559,28 +559,35 @@ class TaperedEnds(Plant):
 
 
 class Rope(Plant):
-    """A rope of 15 kN/m between muscle and load, with a damper of 7.5 N s/m from 10 N on, slack where it would push.
+    """A rope of so many N/m between muscle and load, with a damper in N s/m from 10 N on, slack where it would push.
 
     The muscle has 1 N s/m more for its own motion relative to the load. The own state is the stretch, below zero the slack.
     """
 
     own_scales = (0.01,)
+    stiffness, damper = 15e3, 7.5
 
     def own_start(self, x):
         pressure = VALVE_GAIN * THROWS[0]
-        surplus = lambda stretch: Plant.static_force(self, pressure, x + stretch, []) - 15e3 * max(stretch, 0)
+        surplus = lambda stretch: Plant.static_force(self, pressure, x + stretch, []) - self.stiffness * max(stretch, 0)
         return [brentq(surplus, -0.3, 0.3, xtol=1e-16, rtol=1e-15)]
 
     def loss(self, stretch):
-        return 7.5 * np.clip(15e3 * stretch / 10, 0, 1)
+        return self.damper * np.clip(self.stiffness * stretch / 10, 0, 1)
 
     def own_rates(self, target, pressure, x, velocity, own):
         muscle = Plant.static_force(self, pressure, x + own[0], []) - DAMPING * velocity
-        return [(muscle - 15e3 * max(own[0], 0)) / (DAMPING + 1 + self.loss(own[0]))]
+        return [(muscle - self.stiffness * max(own[0], 0)) / (DAMPING + 1 + self.loss(own[0]))]
 
     def force(self, pressure, x, velocity, own):
         (rate,) = self.own_rates(None, pressure, x, velocity, own)
-        return 15e3 * max(own[0], 0) + self.loss(own[0]) * rate
+        return self.stiffness * max(own[0], 0) + self.loss(own[0]) * rate
+
+
+class Wire(Rope):
+    """Stiffness over damping leaves the muscle 2 ms to follow."""
+
+    stiffness, damper = 2e5, 2e5 * 2e-3 - DAMPING
 
 
 class SeriesElasticity(Plant):
@@ -692,6 +699,7 @@ CASES = [
     Case("series_elasticity", SeriesElasticity(), RAMPS),
     Case("tapered_ends", TaperedEnds(), STAIRS),
     Case("rope", Rope(), THROWS),
+    Case("wire", Wire(), THROWS),
     Case("laid_rope", LaidRope(), RAMPS),
     Case("threshold", Threshold(), STAIRS),
     Case("friction", Friction(), RAMPS),
