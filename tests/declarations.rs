@@ -328,6 +328,7 @@ fn neutral_effects_change_nothing_to_the_last_bit() {
         ("valve_resonance.emptying_excess", 0.5),
         ("valve_resonance.stiffening", 0.5),
         ("valve_dead_band.play_spread", 0.5),
+        ("valve_dead_band.emptying_excess", 0.5),
         ("valve_dead_band.start", 1.0),
         ("supply_saturation.sharpness", 8.0),
         ("supply_saturation.droop", 0.5),

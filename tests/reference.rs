@@ -74,6 +74,18 @@ fn effects_agree_with_scipy() {
                 ("creep.nominal_share", 0.5),
             ],
         ),
+        (
+            "pressure_creep",
+            &[
+                ("creep.pressure_drift_1", 9e-3),
+                ("creep.time_1", 1.5),
+                ("creep.pressure_drift_2", 4e-3),
+                ("creep.time_2", 8.0),
+                ("creep.relaxed_share", 0.0),
+                ("creep.settled_share", 1.0),
+                ("creep.nominal_share", 0.5),
+            ],
+        ),
         ("pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5)]),
         ("uneven_pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5), ("creep.return_ratio", 3.0)]),
         (
@@ -150,6 +162,14 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("overlap", &[("valve_dead_band.pressure_overlap", 6e3), ("valve_dead_band.overlap_steepness", 3.0)]),
+        (
+            "unlike_ports",
+            &[
+                ("valve_dead_band.pressure_overlap", 6e3),
+                ("valve_dead_band.overlap_steepness", 3.0),
+                ("valve_dead_band.emptying_excess", 1.5),
+            ],
+        ),
         (
             "flow_limit",
             &[

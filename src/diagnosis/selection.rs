@@ -130,9 +130,14 @@ fn left_by_form(before: f64) -> f64 {
     NEGLIGIBLE.max(LEFT_BY_FORM * before)
 }
 
-/// What may be left of a signal's error because of noise and the structural error that a sound model may have.
+/// What may be left of a signal's error because of noise, as far as that is known, and the structural error that a sound model may have.
 fn left_by_structure(signal: Signal, data: &Data) -> f64 {
-    NEGLIGIBLE + data.structure(signal)
+    left_by_noise(signal, data) + data.structure(signal)
+}
+
+/// What may be left because of noise alone.
+fn left_by_noise(signal: Signal, data: &Data) -> f64 {
+    NEGLIGIBLE + NOISE_DOUBT * data.noise_doubt(signal)
 }
 
 /// What is left beyond that.
@@ -517,10 +522,9 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Whether an error is no reason to call a model wrong, nor to look for more than one cause.
     fn is_sound(&self, losses: &[Loss]) -> bool {
         let data = &self.bench.data;
-        let doubt = |signal| NOISE_DOUBT * data.noise_doubt(signal);
         let of_sensor = |signal| data.share_of_reading(signal, SENSOR_CLASS);
         let of_structure = |signal| UNEXPLAINED.powi(2) * data.share_of_span(signal);
-        leaves_at_most(losses, |signal| NEGLIGIBLE + doubt(signal) + of_structure(signal).max(of_sensor(signal)))
+        leaves_at_most(losses, |signal| left_by_noise(signal, data) + of_structure(signal).max(of_sensor(signal)))
     }
 
     /// The best hypothesis of all levels, each of which must be worth its effects; the first may be of two.

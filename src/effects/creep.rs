@@ -10,6 +10,8 @@ crate::variables::variables! {
     /// `nominal_share`: all of it if they are those of a muscle that was held for long. The pressure pulls by d_F more, with
     /// τ₁ dd_F/dt + d_F = a_F (A p − A(0) p(0)), `pull_amplitude` a_F, and by the share n of where that goes less. While a drift goes back, its time is `return_ratio` τ; the drift
     /// of the pull does while the pull falls short of it.
+    /// Threads that give way under the pressure have dᵢ go for aᵢ (x − x_r) + bᵢ (p − p_r)/2 bar, `pressure_drift_1` b₁ and `pressure_drift_2`
+    /// b₂, and the membrane feel n (b₁ + b₂) p/2 bar more; p_r is to p what x_r is to x.
     /// A standard linear solid is stiffer for fast changes: springs kᵢ in parallel with the membrane, `relaxing_stiffness_1` and
     /// `relaxing_stiffness_2`, pull back with kᵢ eᵢ, deᵢ/dt = dx/dt − sinh(β eᵢ)/(β τᵢ), with `return_ratio` τᵢ while eᵢ < 0: β is
     /// `activation`, by which what yields thermally yields more readily under stress.
@@ -45,6 +47,10 @@ crate::variables::variables! {
         nominal_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Drift of the pull of the pressure, per pull
         pull_amplitude: f64 = 0.0, ONE, (AHEAD..=1.0);
+        /// Drift at 2 bar, first element
+        pressure_drift_1: f64 = 0.0, METRE, (-0.1..=0.1);
+        /// Drift at 2 bar, second element
+        pressure_drift_2: f64 = 0.0, METRE, (-0.1..=0.1);
         /// Stiffness that relaxes with the first time constant
         relaxing_stiffness_1: f64 = 0.0, NEWTON_PER_METRE, (0.0..=5e4);
         /// Stiffness that relaxes with the second time constant
@@ -64,6 +70,14 @@ const LARGEST_SINH: f64 = 12.0;
 const AHEAD: f64 = -0.5;
 
 impl Creep {
+    /// What both drifts go for at a contraction in m and a pressure relative to the reference.
+    fn aims(&self, contraction: f64, pressure: f64) -> [f64; 2] {
+        [
+            self.amplitude_1 * contraction + self.pressure_drift_1 * pressure,
+            self.amplitude_2 * contraction + self.pressure_drift_2 * pressure,
+        ]
+    }
+
     /// Rate of a drift that goes for `aim` with a time constant.
     fn rate(&self, drift: f64, aim: f64, time: f64) -> f64 {
         let lack = aim - drift;
@@ -90,7 +104,7 @@ impl Effect for Creep {
     const DESCRIPTION: Description = Description {
         name: "creep",
         meaning: "slow visco-elastic drift of the membrane at constant pressure",
-        equation: "x <- x - d1 - d2 + n (a_1 + a_2) x;  tau_i d(d_i)/dt + d_i = a_i (x - x_r);  A p <- A p + d_F;  F <- F - k_i e_i",
+        equation: "x <- x - d1 - d2 + n (a_1 + a_2) x;  tau_i d(d_i)/dt + d_i = a_i (x - x_r) + b_i (p - p_r)/2 bar;  A p <- A p + d_F;  F <- F - k_i e_i",
         signature: "drift over seconds at constant measured pressure",
         experiment: "hold for a minute after a step, up and down",
         reference: "Kelvin-Voigt; Minh et al. 2010",
@@ -100,6 +114,7 @@ impl Effect for Creep {
             &[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.pull_amplitude", &[0.15]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.relaxing_stiffness_1", &[1e3]), ("creep.time_1", &[1.5, 10.0])],
+            &[("creep.pressure_drift_1", &[0.01]), ("creep.time_1", &[1.5, 10.0])],
         ],
         further_forms: &[],
         refinements: &[
@@ -109,18 +124,20 @@ impl Effect for Creep {
             ("creep.settled_share", &[0.5]),
             ("creep.nominal_share", &[0.3]),
             ("creep.pull_amplitude", &[0.05]),
+            ("creep.pressure_drift_2", &[5e-3]),
             ("creep.return_ratio", &[1.5]),
             ("creep.relaxing_stiffness_2", &[500.0]),
             ("creep.activation", &[100.0]),
         ],
     };
-    /// Both drifts of the contraction, contraction and pull where nothing drifts, the drift of the pull, and how far both springs
-    /// are stretched.
-    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e3, 1e3, 0.1, 0.1];
+    /// Both drifts of the contraction, contraction and pull where nothing drifts, the drift of the pull, how far both springs are stretched,
+    /// and the relative pressure at which nothing drifts.
+    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e3, 1e3, 0.1, 0.1, 1.0];
 
     fn is_neutral(&self) -> bool {
-        [self.amplitude_1, self.amplitude_2, self.pull_amplitude, self.relaxing_stiffness_1, self.relaxing_stiffness_2]
-            == [0.0; 5]
+        let Self { amplitude_1, amplitude_2, pull_amplitude, pressure_drift_1, pressure_drift_2, .. } = *self;
+        let of_stretch = [self.relaxing_stiffness_1, self.relaxing_stiffness_2];
+        [amplitude_1, amplitude_2, pull_amplitude, pressure_drift_1, pressure_drift_2] == [0.0; 5] && of_stretch == [0.0; 2]
     }
 
     // The second element may be a small part of the whole, and fast.
@@ -129,16 +146,17 @@ impl Effect for Creep {
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {
-        let relaxed = self.relaxed_share * at.contraction;
-        let settled = self.settled_share * (at.contraction - relaxed);
-        own[..2].copy_from_slice(&[self.amplitude_1 * settled, self.amplitude_2 * settled]);
-        own[2..4].copy_from_slice(&[relaxed, at.pressure_pull]);
+        let [contraction, pressure] = [at.contraction, at.relative_pressure()];
+        let settled = self.settled_share * (1.0 - self.relaxed_share);
+        own[..2].copy_from_slice(&self.aims(contraction, pressure).map(|aim| settled * aim));
+        own[2..4].copy_from_slice(&[self.relaxed_share * contraction, at.pressure_pull]);
+        own[7] = self.relaxed_share * pressure;
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
-        let strain = at.contraction - own[2];
-        rates[0] = self.rate(own[0], self.amplitude_1 * strain, self.time_1);
-        rates[1] = self.rate(own[1], self.amplitude_2 * strain, self.time_2);
+        let aims = self.aims(at.contraction - own[2], at.relative_pressure() - own[7]);
+        rates[0] = self.rate(own[0], aims[0], self.time_1);
+        rates[1] = self.rate(own[1], aims[1], self.time_2);
         let lack = self.pull_amplitude * (at.pressure_pull - own[3]) - own[4];
         rates[4] = lack / self.time(lack * self.pull_amplitude < 0.0, self.time_1);
         for (k, time) in [(5, self.time_1), (6, self.time_2)] {
@@ -165,8 +183,8 @@ impl Effect for Creep {
         if self.is_neutral() {
             return contraction;
         }
-        let known = self.nominal_share * (self.amplitude_1 + self.amplitude_2);
-        contraction - own[0] - own[1] + known * at.contraction
+        let known: f64 = self.aims(at.contraction, at.relative_pressure()).iter().sum();
+        contraction - own[0] - own[1] + self.nominal_share * known
     }
 
     fn sentence(&self) -> String {
@@ -184,6 +202,11 @@ impl Effect for Creep {
         }
         if self.pull_amplitude != 0.0 {
             all.push(format!("the pull of the pressure grows by {}", one(self.pull_amplitude, self.time_1)));
+        }
+        for (drift, time) in [(self.pressure_drift_1, self.time_1), (self.pressure_drift_2, self.time_2)] {
+            if drift != 0.0 {
+                all.push(format!("under 2 bar it gives way by {:.1} mm within {time:.1} s", 1e3 * drift));
+            }
         }
         let readily = if self.activation == 0.0 { "" } else { ", the more readily the further it is stretched" };
         for (stiffness, time) in [(self.relaxing_stiffness_1, self.time_1), (self.relaxing_stiffness_2, self.time_2)] {

@@ -12,7 +12,7 @@ crate::variables::variables! {
     /// Choudhury. Overlap: the spool opens no port while the
     /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
     /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
-    /// opens the more abruptly. All three may be there, in this order.
+    /// opens the more abruptly. A port for emptying may open later, beyond h (1 + a): `emptying_excess` a. All three may be there, in this order.
     ///
     /// # In the data
     /// The pressure residual in slow stairs with the muscle locked: a constant that changes sign with the direction
@@ -40,6 +40,8 @@ crate::variables::variables! {
         pressure_overlap: f64 = 0.0, PASCAL, (0.0..=2e5);
         /// How abruptly a port opens beyond the overlap
         overlap_steepness: f64 = 1.0, ONE, (1.0..=30.0);
+        /// By which share a port for emptying opens later than one for filling
+        emptying_excess: f64 = 0.0, ONE, (-0.95..=10.0);
         /// Where in its play the pilot starts, or in its overlap the pressure: -1 lower end, 1 upper end
         start: f64 = 0.0, ONE, (-1.0..=1.0);
     }
@@ -74,6 +76,12 @@ impl Effect for ValveDeadBand {
             &[("valve_dead_band.stiction", STICTION_STARTS)],
             &[("valve_dead_band.pressure_overlap", &[5e3])],
             &[("valve_dead_band.pressure_overlap", &[3e3, 8e3, 2e4]), ("valve_dead_band.overlap_steepness", &[10.0])],
+            // Unlike ports.
+            &[
+                ("valve_dead_band.pressure_overlap", &[5e3, 2e4]),
+                ("valve_dead_band.overlap_steepness", &[10.0]),
+                ("valve_dead_band.emptying_excess", &[1.5, -0.6]),
+            ],
         ],
         further_forms: &[&[
             ("valve_dead_band.stiction", &[0.03, 0.08, 0.15, 0.03, 0.08, 0.15, 0.03, 0.08, 0.15]),
@@ -106,7 +114,8 @@ impl Effect for ValveDeadBand {
             return target;
         }
         let error = target - at.gauge_pressure;
-        let beyond = self.overlap_steepness * (error.abs() - self.pressure_overlap).max(0.0);
+        let emptying = if error < 0.0 { 1.0 + self.emptying_excess } else { 1.0 };
+        let beyond = self.overlap_steepness * (error.abs() - self.pressure_overlap * emptying).max(0.0);
         at.gauge_pressure + error.signum() * beyond.min(error.abs())
     }
 
@@ -122,7 +131,11 @@ impl Effect for ValveDeadBand {
             parts.push(format!("its pilot sticks until the command is {off} {:.0} mV{then}", 1e3 * self.stiction));
         }
         if self.pressure_overlap > 0.0 {
-            parts.push(format!("no port opens for errors below {:.3} bar", 1e-5 * self.pressure_overlap));
+            let emptying = match self.emptying_excess {
+                0.0 => String::new(),
+                excess => format!(", or {:.3} bar where it empties", 1e-5 * self.pressure_overlap * (1.0 + excess)),
+            };
+            parts.push(format!("no port opens for errors below {:.3} bar{emptying}", 1e-5 * self.pressure_overlap));
         }
         format!("The valve ignores small changes of the command: {}.", parts.join(", "))
     }

@@ -130,6 +130,22 @@ class KnownPullCreep(UnevenPullCreep):
         return Plant.static_force(self, pressure, x, own) - 0.2 * (pressure * VIRTUAL_AREA_1000.area(x) - own[0])
 
 
+class PressureCreep(Plant):
+    """Threads that give way under the pressure, 9 mm and 4 mm at 2 bar, settled at the start and half of that known."""
+
+    own_scales = 0.01, 0.01
+
+    def own_start(self, x):
+        pressure = VALVE_GAIN * STAIRS[0]
+        return [9e-3 * pressure / 2e5, 4e-3 * pressure / 2e5]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(9e-3 * pressure / 2e5 - own[0]) / 1.5, (4e-3 * pressure / 2e5 - own[1]) / 8.0]
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x - own[0] - own[1] + 6.5e-3 * pressure / 2e5, own)
+
+
 class Relaxation(Plant):
     """Springs to points that follow the muscle's end as dashpots let them: a standard linear solid of two times."""
 
@@ -355,6 +371,16 @@ class Overlap(Plant):
     def pressure_rate(self, target, pressure, x, own):
         error = target - pressure
         return VALVE_BANDWIDTH * np.sign(error) * np.interp(abs(error), [0, 6e3, 9e3, 1e6], [0, 0, 9e3, 1e6])
+
+
+class UnlikePorts(Plant):
+    """As with an overlap of 6 kPa, but that a port for emptying opens from 15 kPa on."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        error = target - pressure
+        overlap = 6e3 if error > 0 else 15e3
+        beyond = np.interp(abs(error), [0, overlap, 1.5 * overlap, 1e6], [0, 0, 1.5 * overlap, 1e6])
+        return VALVE_BANDWIDTH * np.sign(error) * beyond
 
 
 class FlowLimit(Plant):
@@ -660,6 +686,7 @@ CASES = [
     Case("pull_creep", PullCreep(), STAIRS),
     Case("uneven_pull_creep", UnevenPullCreep(), STAIRS),
     Case("known_pull_creep", KnownPullCreep(), STAIRS),
+    Case("pressure_creep", PressureCreep(), STAIRS),
     Case("relaxation", Relaxation(), STAIRS),
     Case("activated_relaxation", ActivatedRelaxation(), STAIRS),
     Case("regulator", Regulator(), STAIRS),
@@ -677,6 +704,7 @@ CASES = [
     Case("late_stiction", LateStiction(), RAMPS),
     Case("sliding", Sliding(), ramps([(0, 1.0), (0.3, 1.0), (1.2, 1.7), (1.6, 1.7), (2.2, 2.1), (2.8, 1.4), (4, 1.7), (5, 1.7)])),
     Case("overlap", Overlap(), STAIRS),
+    Case("unlike_ports", UnlikePorts(), STAIRS),
     Case("flow_limit", FlowLimit(), STAIRS),
     Case("nozzle", Nozzle(), STAIRS),
     Case("leakage", Leakage(), STAIRS),
