@@ -137,7 +137,8 @@ impl Effect for Creep {
     fn is_neutral(&self) -> bool {
         let Self { amplitude_1, amplitude_2, pull_amplitude, pressure_drift_1, pressure_drift_2, .. } = *self;
         let of_stretch = [self.relaxing_stiffness_1, self.relaxing_stiffness_2];
-        [amplitude_1, amplitude_2, pull_amplitude, pressure_drift_1, pressure_drift_2] == [0.0; 5] && of_stretch == [0.0; 2]
+        [amplitude_1, amplitude_2, pull_amplitude, pressure_drift_1, pressure_drift_2] == [0.0; 5]
+            && of_stretch == [0.0; 2]
     }
 
     // The second element may be a small part of the whole, and fast.
