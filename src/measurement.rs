@@ -75,6 +75,8 @@ pub struct Recording {
     signals: BTreeMap<Signal, Vec<f64>>,
     /// Unit that the file names for each column.
     units: BTreeMap<Signal, &'static str>,
+    /// How many samples of the file there were to each of these, see [`Self::thinned`].
+    every: usize,
     /// What a person should know about how the file was read.
     pub notes: Vec<String>,
 }
@@ -136,14 +138,14 @@ impl Recording {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let time = signals.remove(&Time).unwrap_or_default();
         let units = columns.iter().flatten().map(|column| (column.signal, column.unit)).collect();
-        Self { path: path.to_owned(), name, number: None, time, lines, signals, units, notes }.checked()
+        Self { path: path.to_owned(), name, number: None, time, lines, signals, units, notes, every: 1 }.checked()
     }
 
     /// An experiment that is yet to be made: its inputs in SI units, each of shape `(n_samples,)`.
     pub(crate) fn planned(name: &str, time: Vec<f64>, inputs: BTreeMap<Signal, Vec<f64>>) -> Self {
         let (path, name) = (PathBuf::from(name), name.to_owned());
         let (lines, units, notes) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Self { path, name, number: None, time, lines, signals: inputs, units, notes }
+        Self { path, name, number: None, time, lines, signals: inputs, units, notes, every: 1 }
     }
 
     /// Refuses what no use could be made of, and drops rows without a new time.
@@ -255,6 +257,7 @@ impl Recording {
             time: picked(&self.time),
             lines: kept().map(|k| self.line(k)).collect(),
             signals: self.signals.iter().map(thinned).collect(),
+            every: self.every * every,
             ..self.clone()
         }
     }
@@ -266,20 +269,19 @@ impl Recording {
     }
 
     /// The same along straight lines, but for jumps of the command: these are over in the middle between their samples, or else
-    /// begin there. A jump is a change that is more than twice as large as those before and after.
+    /// begin there; where samples were left out, they are that much less off. A jump is more than twice as fast as what goes before and after.
     pub fn with_jumps(&self, early: bool) -> Self {
-        let change = |values: &[f64], k: usize| (values[k + 1] - values[k]).abs();
+        let rate = |values: &[f64], k: usize| (values[k + 1] - values[k]).abs() / (self.time[k + 1] - self.time[k]);
         let jumps = |values: &[f64], k: usize| {
-            let before = if k > 0 { change(values, k - 1) } else { 0.0 };
-            let after = if k + 2 < values.len() { change(values, k + 1) } else { 0.0 };
-            change(values, k) > 2.0 * before.max(after)
+            let before = if k > 0 { rate(values, k - 1) } else { 0.0 };
+            let after = if k + 2 < values.len() { rate(values, k + 1) } else { 0.0 };
+            rate(values, k) > 2.0 * before.max(after)
         };
         self.with_middles(|signal, values, k| {
-            if signal == Signal::Command && jumps(values, k) {
-                values[if early { k + 1 } else { k }]
-            } else {
-                0.5 * (values[k] + values[k + 1])
-            }
+            let line = 0.5 * (values[k] + values[k + 1]);
+            let is_doubtful = signal == Command && jumps(values, k);
+            let end = values[if early { k + 1 } else { k }];
+            if is_doubtful { line + (end - line) / self.every as f64 } else { line }
         })
     }
 
@@ -488,6 +490,43 @@ mod tests {
         let off = command.iter().zip(&doubled.time).map(|(u, t)| (u - cubic(*t)).abs());
         assert!(off.skip(2).take(19).all(|off| off < 1e-10), "{command:?}");
         assert_eq!(command[1], 0.5 * (command[0] + command[2]));
+    }
+
+    /// What the command is in the middle between its samples if jumps are early, and if they are late.
+    fn middles(command: impl Fn(usize) -> f64, time: impl Fn(usize) -> f64) -> [Vec<f64>; 2] {
+        let text = rows("time [s],command [V],contraction [mm]", |k| format!("{},{},{k}", time(k), command(k)));
+        let recording = parse(&text).unwrap();
+        [true, false]
+            .map(|early| recording.with_jumps(early).get(Command).unwrap().iter().skip(1).step_by(2).copied().collect())
+    }
+
+    #[test]
+    fn only_jumps_have_a_doubtful_instant() {
+        let even = |k: usize| k as f64;
+        for jump in [0, 4, 10] {
+            let [early, late] = middles(|k| if k > jump { 3.0 } else { 1.0 }, even);
+            assert_eq!([early[jump], late[jump]], [3.0, 1.0]);
+            let others = |middles: &[f64]| {
+                middles.iter().enumerate().filter(|(k, _)| *k != jump).map(|(_, u)| *u).collect::<Vec<_>>()
+            };
+            assert_eq!(others(&early), others(&late));
+        }
+        let [early, late] = middles(even, even);
+        assert_eq!(early, late);
+        // Rows that are missing make a ramp no jump.
+        let gap = |k: usize| if k > 5 { k + 7 } else { k } as f64;
+        let [early, late] = middles(gap, gap);
+        assert_eq!(early, late);
+    }
+
+    #[test]
+    fn thinning_keeps_the_instant_of_a_jump() {
+        let time: Vec<f64> = (0..4000).map(|k| 1e-3 * f64::from(k)).collect();
+        let command = time.iter().map(|t| if *t < 1.9985 { 1.0 } else { 3.0 }).collect();
+        let thinned = Recording::planned("r", time, BTreeMap::from([(Command, command)])).thinned(4e-3);
+        let [early, late] = [true, false].map(|early| thinned.with_jumps(early).get(Command).unwrap().to_vec());
+        let doubt = early.iter().zip(&late).map(|(early, late)| early - late).fold(0.0, f64::max);
+        assert!(doubt > 0.0 && doubt <= 2.0 / 4.0, "{doubt}");
     }
 
     #[test]

@@ -22,8 +22,8 @@ const SOURCE: &str = "Master thesis \u{201c}Comparative Assessment and Improveme
 
 /// Stiffness of what stretches, times this time in s, is how it damps: without mass and loss it would be infinitely fast.
 const LOSS_TIME: f64 = 5e-4;
-/// Time in s that the muscle, damped itself, takes at least to follow what is stiff: what damps more then moves nothing by as much as
-/// sensors show, and small steps would be taken for nothing.
+/// The same of something stiff, together with the damping of the muscle: at 1 kN/s that is less than 0.02 mm off, and a shorter time would
+/// take the smaller steps.
 const FOLLOWING_TIME: f64 = 2e-3;
 /// Pull in N from which on it does: where it becomes slack, nothing jumps.
 const TAUT: f64 = 10.0;

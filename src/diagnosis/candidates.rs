@@ -185,6 +185,12 @@ impl Hypothesis {
         Self { parts: self.parts.iter().copied().filter(|part| part.effect.name != effect).collect() }
     }
 
+    /// With one of its effects in the form of another part.
+    pub fn in_form_of(&self, other: Part) -> Self {
+        let exchanged = |part: &Part| if part.effect.name == other.effect.name { other } else { *part };
+        Self { parts: self.parts.iter().map(exchanged).collect() }
+    }
+
     /// With only those of its refinements whose parameters are wanted.
     fn refined_as(&self, is_wanted: impl Fn(&str) -> bool) -> Self {
         Self { parts: self.parts.iter().map(|part| part.refined_as(&is_wanted)).collect() }
@@ -543,14 +549,23 @@ impl<'a> Bench<'a> {
     /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.
     pub fn start(&self, base: &Fitted, part: Part, choice: usize) -> Option<Start> {
         let parameters = at_start(&base.parameters, part.freed(), choice);
-        let changed = self.data.residuals(&parameters)?;
-        let change = changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect::<Vec<_>>();
-        let change = weighted(&change, &self.weights);
+        let change = |model: &Parameters| {
+            let changed = self.data.residuals(model)?;
+            let change = changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect::<Vec<_>>();
+            Some(weighted(&change, &self.weights))
+        };
+        let whole = change(&parameters)?;
         // What shows nothing at a usual size cannot be told from nothing.
-        if change.iter().map(|c| c * c).sum::<f64>() < 1.0 {
+        if whole.iter().map(|c| c * c).sum::<f64>() < 1.0 {
             return None;
         }
-        let promise = self.promise(base, change);
+        // What is another one in each recording goes its own way there.
+        let anew = part.freed().filter(|(name, _)| recordings_for(name) > 1);
+        let neutral = |name| declared(&Parameters::default(), name);
+        let without =
+            anew.map(|(name, _)| neutral(name)).map(|(own, value)| with_values(&parameters, &[own], &[value]));
+        let in_others = without.filter_map(|model| change(&model));
+        let promise = self.promise(base, [whole].into_iter().chain(in_others).collect());
         Some(Start { promise, part, choice, parameters })
     }
 
@@ -568,12 +583,12 @@ impl<'a> Bench<'a> {
         self.best_of(starts.collect()).map(|(_, model)| model)
     }
 
-    /// Share of the squares that goes away when a change is scaled, up to five times in either direction, and the
+    /// Share of the squares that goes away when changes are scaled, up to five times in either direction, and the
     /// corrections adapt within their bounds.
-    fn promise(&self, base: &Fitted, change: Vec<f64>) -> f64 {
+    fn promise(&self, base: &Fitted, changes: Vec<Vec<f64>>) -> f64 {
         let residuals = weighted(&base.residuals, &self.weights);
         let scale = Free { start: 0.0, lower: -5.0, upper: 5.0, typical: 1.0, prior: None };
-        let (mut free, mut columns) = (vec![scale], vec![change]);
+        let (mut free, mut columns) = (vec![scale; changes.len()], changes);
         for ((variable, correction), slope) in self.corrections.iter().zip(&self.slopes) {
             free.push(correction.from(declared(&base.parameters, variable.name).1));
             columns.push(weighted(slope, &self.weights));
@@ -638,13 +653,13 @@ impl<'a> Bench<'a> {
         Some((0..free.len()).map(deviation).collect())
     }
 
-    /// Whether some parameter of an effect shows in samples that fits may not see, and in none of the others: one that jumps late.
-    pub fn shows_late(&self, fitted: &Fitted) -> bool {
+    /// Whether some parameter of an effect shows in none of the samples that its fit saw, but in others: one that jumps late.
+    pub fn shows_elsewhere(&self, fitted: &Fitted, seen: Scope) -> bool {
         let variables = fitted.hypothesis.variables();
         let free = bounds(&variables, &fitted.parameters);
         let at: Vec<f64> = free.iter().map(|f| f.start).collect();
         let residuals = |values: &[f64]| self.data.residuals(&with_values(&fitted.parameters, &variables, values));
-        let [seen, unseen] = [Scope::Training, Scope::HeldOut].map(|scope| self.data.weights(scope));
+        let [seen, unseen] = [seen, seen.others()].map(|scope| self.data.weights(scope));
         let columns = derivatives(&residuals, &free, &at, &fitted.residuals);
         columns.iter().any(|column| cost(column, &seen) == 0.0 && cost(column, &unseen) > 0.0)
     }

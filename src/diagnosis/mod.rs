@@ -121,7 +121,7 @@ pub struct Diagnosis {
     /// Which samples no fit saw.
     pub held_out: String,
     /// Whether the fit saw those as well, because the others do not tell the size of a cause precisely enough to foretell
-    /// them.
+    /// them, or are only foretold by them.
     pub saw_all: bool,
     /// All candidates, the best first.
     pub ranking: Vec<Ranked>,

@@ -60,7 +60,7 @@ pub struct Loss {
     pub samples: usize,
     /// Mean square relative to that of the noise.
     pub excess: f64,
-    /// The same where what jumps of the command leave between their samples may be, too.
+    /// The same, where a residual beyond noise is excused as far as the unknown instant of a jump of the command may leave it.
     pub doubtless: f64,
     /// Mean square that the structural error of a sound nominal model makes, relative to that of the noise.
     pub structure: f64,
@@ -220,8 +220,8 @@ impl<'a> Data<'a> {
         Some(cubics.iter().zip(residuals).map(|(cubic, line)| cubic - line).collect())
     }
 
-    /// Half of what it makes of a difference to the residuals of a model whether jumps of the command come a quarter of a sampling
-    /// interval earlier or later than the middle between their samples: a quarter is about the deviation if all instants there are as likely.
+    /// Half of the difference that it makes to the residuals of a model whether jumps of the command come a quarter of a sampling interval
+    /// before or after the middle between their samples: about the deviation if all instants there are as likely.
     fn mistiming(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         let jumping = |early: bool| {
             let recordings: Vec<Recording> =
@@ -269,13 +269,19 @@ impl<'a> Data<'a> {
             let level = self.noise[&segment.signal].level;
             let in_scope =
                 segment.samples.iter().zip(segment.range.clone()).filter(|(k, _)| self.is_in(scope, segment, **k));
+            // Excused, and not credited: what is below noise does not make up for errors elsewhere.
+            let excused = |at: usize| {
+                let [of_noise, of_both] =
+                    [level, level.hypot(self.mistimed[at])].map(|of| (residuals[at] / of).powi(2));
+                of_noise.min(1.0).max(of_both)
+            };
             let (scaled, doubtless): (Vec<f64>, Vec<f64>) =
-                in_scope.map(|(_, at)| (residuals[at] / level, residuals[at] / level.hypot(self.mistimed[at]))).unzip();
+                in_scope.map(|(_, at)| (residuals[at] / level, excused(at))).unzip();
             (!scaled.is_empty()).then(|| Loss {
                 signal: segment.signal,
                 samples: scaled.len(),
                 excess: mean_square(&scaled),
-                doubtless: mean_square(&doubtless),
+                doubtless: doubtless.iter().sum::<f64>() / doubtless.len() as f64,
                 structure: self.structure(segment.signal),
                 effective: effective_samples(&scaled, self.recordings[segment.recording].period()),
             })

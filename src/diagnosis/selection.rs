@@ -113,8 +113,8 @@ fn gain(without: &[Loss], with: &[Loss]) -> f64 {
     without.iter().zip(with).map(|(b, a)| 0.5 * a.effective * ratio(b, a).ln()).sum()
 }
 
-/// Mean squared residual per signal beyond that of the noise, relative to it; what may come from between the samples of the command is
-/// none.
+/// Mean squared residual per signal beyond that of the noise, relative to it; what the unknown instants of jumps of the command may leave
+/// does not count.
 fn beyond_noise(losses: &[Loss]) -> BTreeMap<Signal, f64> {
     let mut sums: BTreeMap<Signal, (f64, f64)> = BTreeMap::new();
     for loss in losses {
@@ -130,7 +130,7 @@ fn left_by_form(before: f64) -> f64 {
     NEGLIGIBLE.max(LEFT_BY_FORM * before)
 }
 
-/// What may be left of a signal's error because of noise, as far as that is known, and the structural error that a sound model may have.
+/// What may be left of a signal's error because of noise, which is known so precisely, and the structural error that a sound model may have.
 fn left_by_structure(signal: Signal, data: &Data) -> f64 {
     left_by_noise(signal, data) + data.structure(signal)
 }
@@ -303,20 +303,25 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     /// The same, refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
-    /// best with all of its effects, those that are carried on or may rival it with their last. Where the best leaves no more
+    /// best and the best that is possible with all of their effects, those that are carried on or may rival it with their last. Where the best leaves no more
     /// than forms may, only its possible rivals are, with all of theirs; other forms are worth the time to single effects, also where the
     /// best explains enough to be the only cause.
     fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
+        // What cannot be leads nothing, however good.
+        let leads = judged.iter().position(is_possible);
         let mut others = judged.into_iter().enumerate();
         let Some(best) = others.next().map(|(_, best)| self.in_best_form(best)) else { return Vec::new() };
         let may_be_form = self.may_be_form(&best.fitted.losses);
         let explains = best.explained > LEAST_EXPLAINED.0;
-        let is_close = |(rank, _): &(usize, Judged)| rivals.contains(rank) || !may_be_form && ranks.contains(rank);
+        let is_close = |(rank, _): &(usize, Judged)| {
+            rivals.contains(rank) || !may_be_form && ranks.contains(rank) || leads == Some(*rank)
+        };
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
-        let refined = close.into_par_iter().map(|(_, judged)| match judged.fitted.hypothesis.parts.len() {
+        let refined = close.into_par_iter().map(|(rank, judged)| match judged.fitted.hypothesis.parts.len() {
             1 if may_be_form || explains => self.in_best_form(judged),
+            _ if leads == Some(rank) => self.in_best_form(judged),
             _ if may_be_form => self.finished_refined(judged, |judged| self.refined(judged)),
             parts => self.finished_refined(judged, |judged| self.part_refined(judged, parts - 1)),
         });
@@ -336,15 +341,9 @@ impl<'a, 'b> Search<'a, 'b> {
         if is_possible(&refined) || !is_possible(&judged) { refined } else { self.finished(judged) }
     }
 
-    /// A hypothesis refined in all its effects and, where something is left then, further refined, and in the best form of its
-    /// last.
+    /// A hypothesis refined in all its effects and, where something is left then, further refined, and with one of them in another form.
     fn in_best_form(&self, judged: Judged) -> Judged {
         let refined = self.finished_refined(judged.clone(), |judged| self.refined(judged));
-        self.in_better_form(judged, refined)
-    }
-
-    /// The best of a hypothesis that is refined in all its effects, and of what it is further refined and in other forms of its last.
-    fn in_better_form(&self, judged: Judged, refined: Judged) -> Judged {
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;
         }
@@ -356,19 +355,19 @@ impl<'a, 'b> Search<'a, 'b> {
             .any(|part| ![Refined::NOT, self.bench.fully(part.effect)].contains(&part.refined));
         let further = partly.then(|| self.finished_refined(refined.clone(), |judged| self.refined(judged)));
         let other = self.in_other_forms(&judged).map(|other| self.finished_refined(other, |other| self.refined(other)));
-        let all = further.into_iter().chain(other).chain([refined.clone()]);
-        all.max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
+        let all = further.into_iter().chain(other).filter(|fit| is_possible(fit) || !is_possible(&refined));
+        all.chain([refined.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
     }
 
-    /// The hypothesis in the best other form of its last effect: of the starts only the most promising were fitted.
+    /// The hypothesis with one of its effects in another form, the best of these: of the starts only the most promising were fitted.
     fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
-        let last = judged.fitted.hypothesis.parts.last()?;
-        let others =
-            self.bench.forms(last.effect).filter(|part| part.form != last.form).collect::<Vec<_>>().into_par_iter();
-        let fits = others.filter_map(|part| {
-            let start = self.bench.best_start(&judged.fitted.parameters, *last, part)?;
-            let hypothesis = judged.fitted.hypothesis.without(last.effect.name).with(part);
-            let fitted = self.bench.rough_fit(&hypothesis, &start)?;
+        let parts = &judged.fitted.hypothesis.parts;
+        let others = parts.iter().flat_map(|own| {
+            self.bench.forms(own.effect).filter(|part| part.form != own.form).map(move |part| (*own, part))
+        });
+        let fits = others.collect::<Vec<_>>().into_par_iter().filter_map(|(own, part)| {
+            let start = self.bench.best_start(&judged.fitted.parameters, own, part)?;
+            let fitted = self.bench.rough_fit(&judged.fitted.hypothesis.in_form_of(part), &start)?;
             (!self.may_be_driven(&fitted, part)).then(|| self.judge(fitted))
         });
         fits.max_by(|a, b| a.score.total_cmp(&b.score))
@@ -495,14 +494,15 @@ impl<'a, 'b> Search<'a, 'b> {
         self.rivals_in_best_form(each_once(next))
     }
 
-    /// Hypotheses of several effects, those that a form may keep from rivalling the best in other forms of their last.
+    /// Hypotheses of several effects, those in their best form that a form may keep from rivalling the best.
     fn rivals_in_best_form(&self, level: Vec<Judged>) -> Vec<Judged> {
         let best = possible(&level).filter(|best| self.may_be_form(&best.fitted.losses));
         let Some(best) = best.map(|best| best.fitted.hypothesis.names()) else { return level };
         let lacks_form =
             |judged: &Judged| judged.explained > LEAST_EXPLAINED_EXACTLY.0 && judged.fitted.hypothesis.names() != best;
-        let (close, rest): (Vec<_>, Vec<_>) = level.into_iter().partition(lacks_form);
-        let close = close.into_par_iter().map(|judged| self.in_better_form(judged.clone(), judged));
+        let (mut close, mut rest): (Vec<_>, Vec<_>) = level.into_iter().partition(lacks_form);
+        rest.extend(close.split_off(close.len().min(MAY_BE_RIVALS)));
+        let close = close.into_par_iter().map(|judged| self.in_best_form(judged));
         sorted(close.chain(rest).collect())
     }
 
@@ -568,7 +568,7 @@ impl<'a, 'b> Search<'a, 'b> {
         !leaves_at_most(&self.baseline.losses, |signal| self.bench.data.structure(signal).max(NEGLIGIBLE))
     }
 
-    /// Drops effects that a hypothesis of several can spare, the most superfluous first.
+    /// Drops effects that a hypothesis of several can spare and be possible, the most superfluous first.
     fn pruned(&self, judged: Judged) -> Judged {
         let parts = judged.fitted.hypothesis.parts.clone();
         if parts.len() < 2 {
@@ -625,13 +625,16 @@ impl<'a, 'b> Search<'a, 'b> {
     /// do.
     fn foretelling(&self, told: Judged) -> Option<(Fitted, bool)> {
         let seeing = |seen| self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, seen);
+        let may_be = |fitted: &Fitted| !fitted.hypothesis.is_impossible(&fitted.parameters);
+        let foretells = |fitted: &Fitted, seen| {
+            Some(may_be(fitted) && self.holds(fitted, seen)? && !self.bench.shows_elsewhere(fitted, seen))
+        };
         let model = seeing(Scope::Training)?;
-        let may_be = !model.hypothesis.is_impossible(&model.parameters);
-        if may_be && self.holds(&model, Scope::Training)? && !self.bench.shows_late(&model) {
+        if foretells(&model, Scope::Training)? {
             return Some((model, true));
         }
-        let later = || self.holds(&seeing(Scope::HeldOut)?, Scope::HeldOut);
-        let tells_too_little = may_be && self.is_as_good_in_training(&told.fitted, &model) || later()?;
+        let tells_too_little = may_be(&model) && self.is_as_good_in_training(&told.fitted, &model)
+            || foretells(&seeing(Scope::HeldOut)?, Scope::HeldOut)?;
         (tells_too_little && self.holds(&told.fitted, Scope::Training)?).then_some((told.fitted, false))
     }
 
@@ -685,14 +688,14 @@ impl<'a, 'b> Search<'a, 'b> {
         !self.shows(&seen(fitted), &seen(trained))
     }
 
-    /// Whether a hypothesis that was fitted to samples does better on all others.
-    fn holds(&self, trained: &Fitted, seen: Scope) -> Option<bool> {
+    /// Whether a fit does better than the baseline, fitted to some samples, does on all others.
+    fn holds(&self, fitted: &Fitted, seen: Scope) -> Option<bool> {
         let Fitted { hypothesis, parameters, .. } = &self.baseline;
         let baseline = self.bench.exact_fit(hypothesis, parameters, seen)?;
-        let unseen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, seen.others());
-        let (without, with) = (unseen(&baseline), unseen(trained));
+        let unseen = |of: &Fitted| self.bench.data.losses(&of.residuals, seen.others());
+        let (without, with) = (unseen(&baseline), unseen(fitted));
         let explained = explained(&without, &with, &self.bench.data);
-        Some(gain(&without, &with) > 0.0 && explained > least_explained(trained).1)
+        Some(gain(&without, &with) > 0.0 && explained > least_explained(fitted).1)
     }
 
     /// Hypotheses that explain the data as well as the best, which can be told with `size` parameters: all that the odds allow, or else

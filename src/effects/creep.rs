@@ -10,15 +10,16 @@ crate::variables::variables! {
     /// `nominal_share`: all of it if they are those of a muscle that was held for long. The pressure pulls by d_F more, with
     /// τ₁ dd_F/dt + d_F = a_F (A p − A(0) p(0)), `pull_amplitude` a_F, and by the share n of where that goes less. While a drift goes back, its time is `return_ratio` τ; the drift
     /// of the pull does while the pull falls short of it.
-    /// Threads that give way under the pressure have dᵢ go for aᵢ (x − x_r) + bᵢ (p − p_r)/2 bar, `pressure_drift_1` b₁ and `pressure_drift_2`
-    /// b₂, and the membrane feel n (b₁ + b₂) p/2 bar more; p_r is to p what x_r is to x.
+    /// Where pressure drives it, dᵢ goes for aᵢ (x − x_r) + bᵢ (p − p_r)/2 bar, `pressure_drift_1` b₁ and `pressure_drift_2` b₂, and
+    /// braid and membrane feel n (b₁ + b₂) p/2 bar more; p_r is to p what x_r is to x, and dᵢ(0) the settled share of all of that. A braid
+    /// that goes on widening has b > 0, threads that go on stretching b < 0.
     /// A standard linear solid is stiffer for fast changes: springs kᵢ in parallel with the membrane, `relaxing_stiffness_1` and
     /// `relaxing_stiffness_2`, pull back with kᵢ eᵢ, deᵢ/dt = dx/dt − sinh(β eᵢ)/(β τᵢ), with `return_ratio` τᵢ while eᵢ < 0: β is
     /// `activation`, by which what yields thermally yields more readily under stress.
     ///
     /// # In the data
     /// Contraction drifts for seconds at constant measured pressure, unlike up and down; in a prescribed motion the force
-    /// does, with the part of the pull also where the muscle is locked. A leak drifts in the pressure; hysteresis does not
+    /// does, with the parts of pull and pressure also where the muscle is locked. A leak drifts in the pressure; hysteresis does not
     /// depend on time.
     ///
     /// # Validity
@@ -47,9 +48,9 @@ crate::variables::variables! {
         nominal_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Drift of the pull of the pressure, per pull
         pull_amplitude: f64 = 0.0, ONE, (AHEAD..=1.0);
-        /// Drift at 2 bar, first element
+        /// Drift of the contraction at 2 bar, first element
         pressure_drift_1: f64 = 0.0, METRE, (-0.1..=0.1);
-        /// Drift at 2 bar, second element
+        /// Drift of the contraction at 2 bar, second element
         pressure_drift_2: f64 = 0.0, METRE, (-0.1..=0.1);
         /// Stiffness that relaxes with the first time constant
         relaxing_stiffness_1: f64 = 0.0, NEWTON_PER_METRE, (0.0..=5e4);
@@ -104,7 +105,7 @@ impl Effect for Creep {
     const DESCRIPTION: Description = Description {
         name: "creep",
         meaning: "slow visco-elastic drift of the membrane at constant pressure",
-        equation: "x <- x - d1 - d2 + n (a_1 + a_2) x;  tau_i d(d_i)/dt + d_i = a_i (x - x_r) + b_i (p - p_r)/2 bar;  A p <- A p + d_F;  F <- F - k_i e_i",
+        equation: "x <- x - d1 - d2 + n (a_1 + a_2) x;  tau_i d(d_i)/dt + d_i = a_i (x - x_r) + b_i (p - p_r)/2 bar;  x <- x + n (b_1 + b_2) p/2 bar;  A p <- A p + d_F;  F <- F - k_i e_i",
         signature: "drift over seconds at constant measured pressure",
         experiment: "hold for a minute after a step, up and down",
         reference: "Kelvin-Voigt; Minh et al. 2010",
@@ -114,7 +115,7 @@ impl Effect for Creep {
             &[("creep.amplitude_1", &[0.08]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.pull_amplitude", &[0.15]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.relaxing_stiffness_1", &[1e3]), ("creep.time_1", &[1.5, 10.0])],
-            &[("creep.pressure_drift_1", &[0.01]), ("creep.time_1", &[1.5, 10.0])],
+            &[("creep.pressure_drift_1", &[0.01, 0.01, -0.01, -0.01]), ("creep.time_1", &[1.5, 10.0, 1.5, 10.0])],
         ],
         further_forms: &[],
         refinements: &[
@@ -206,7 +207,8 @@ impl Effect for Creep {
         }
         for (drift, time) in [(self.pressure_drift_1, self.time_1), (self.pressure_drift_2, self.time_2)] {
             if drift != 0.0 {
-                all.push(format!("under 2 bar it gives way by {:.1} mm within {time:.1} s", 1e3 * drift));
+                let way = if drift < 0.0 { "lengthens" } else { "shortens" };
+                all.push(format!("2 bar {way} the muscle by {:.1} mm within {time:.1} s", 1e3 * drift.abs()));
             }
         }
         let readily = if self.activation == 0.0 { "" } else { ", the more readily the further it is stretched" };

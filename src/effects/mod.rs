@@ -179,7 +179,7 @@ pub trait Effect: Declared + Default {
     fn in_recording(&mut self, number: f64) {
         self.visit_mut(&mut |variable, old| if variable.name.ends_with(".recording") { number } else { old });
     }
-    /// Without what it does only while the valve moves.
+    /// As it acts on where the valve comes to rest, but for what [`Effect::rests_off`] says.
     fn at_rest(self) -> Self {
         self
     }
@@ -351,7 +351,7 @@ macro_rules! effects {
                 $(self.$field.in_recording(number);)*
             }
 
-            /// All effects without what they do only while the valve moves.
+            /// All effects as they act on where the valve comes to rest, but for what [`Self::rests_off`] says.
             pub fn at_rest(self) -> Self {
                 Self { $($field: self.$field.at_rest(),)* }
             }

@@ -15,9 +15,9 @@ crate::variables::variables! {
     /// stiffer or softer bladder does not depend on pressure with the length locked; an elastic cable does.
     ///
     /// # Validity
-    /// A cable without mass that pulls and never pushes, and loses as much as a damper of 0.5 ms times its stiffness, or of as much as
-    /// makes 2 ms with the damping of the muscle. The muscle moves by itself: its damping, friction and creep are of its own
-    /// contraction. 10⁵ to 10⁶ N/m are usual stiffnesses.
+    /// A cable without mass that pulls and does not push, but for a millisecond in which it goes slack. It loses as much as a damper of
+    /// 0.5 ms times its stiffness, or, where that is more, of 2 ms times its stiffness less the nominal damping of the muscle. The
+    /// muscle moves by itself: its damping, friction and creep are of its own contraction. 10⁵ to 10⁶ N/m are usual stiffnesses.
     ///
     /// # Reference
     /// Hooke's law; power law of slack strands.

@@ -12,7 +12,8 @@ crate::variables::variables! {
     /// Choudhury. Overlap: the spool opens no port while the
     /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
     /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
-    /// opens the more abruptly. A port for emptying may open later, beyond h (1 + a): `emptying_excess` a. All three may be there, in this order.
+    /// opens the more abruptly. The port for emptying may have another overlap, h (1 + a): `emptying_excess` a. All three may be
+    /// there, in this order.
     ///
     /// # In the data
     /// The pressure residual in slow stairs with the muscle locked: a constant that changes sign with the direction
@@ -36,11 +37,11 @@ crate::variables::variables! {
         jump_time: f64 = 0.0, SECOND, (0.0..=0.1);
         /// Speed of the command above which a pilot that has broken loose slides along until the command turns
         sliding_speed: f64 = 1e9, VOLT_PER_SECOND, (0.0..=1e9);
-        /// Deviation from the target pressure below which no port opens
+        /// Deviation from the target pressure below which the port for filling does not open, nor the one for emptying
         pressure_overlap: f64 = 0.0, PASCAL, (0.0..=2e5);
         /// How abruptly a port opens beyond the overlap
         overlap_steepness: f64 = 1.0, ONE, (1.0..=30.0);
-        /// By which share a port for emptying opens later than one for filling
+        /// By which share the overlap of the port for emptying is wider
         emptying_excess: f64 = 0.0, ONE, (-0.95..=10.0);
         /// Where in its play the pilot starts, or in its overlap the pressure: -1 lower end, 1 upper end
         start: f64 = 0.0, ONE, (-1.0..=1.0);
@@ -58,11 +59,18 @@ const STICTION_STARTS: &[f64] = &[
     0.269, 0.290, 0.312, 0.336, 0.362, 0.390, 0.420, 0.452, 0.487,
 ];
 
+impl ValveDeadBand {
+    /// Deviation in Pa above the target below which the port for emptying does not open.
+    fn overlap_of_emptying(&self) -> f64 {
+        self.pressure_overlap * (1.0 + self.emptying_excess)
+    }
+}
+
 impl Effect for ValveDeadBand {
     const DESCRIPTION: Description = Description {
         name: "valve_dead_band",
         meaning: "small changes of the command do nothing: play or stiction of the pilot",
-        equation: "|u - w| <= play;  w <- u where |u - w| >= stiction, and then for as long as u keeps its direction;  dp/dt = 0 where |K w - p| < overlap",
+        equation: "|u - w| <= play;  w <- u where |u - w| >= stiction, and then for as long as u keeps its direction;  dp/dt = 0 where -h (1 + a) < K w - p < h",
         signature: "pressure residual of constant size that follows the direction of the command, or steps",
         experiment: "slow stairs and ramps of the command, up and down, with the muscle locked",
         reference: "Choudhury et al. 2005",
@@ -101,7 +109,7 @@ impl Effect for ValveDeadBand {
     }
 
     fn rests_off(&self) -> f64 {
-        self.start * self.pressure_overlap
+        self.start * if self.start > 0.0 { self.overlap_of_emptying() } else { self.pressure_overlap }
     }
 
     fn slack(&self) -> Slack {
@@ -114,8 +122,8 @@ impl Effect for ValveDeadBand {
             return target;
         }
         let error = target - at.gauge_pressure;
-        let emptying = if error < 0.0 { 1.0 + self.emptying_excess } else { 1.0 };
-        let beyond = self.overlap_steepness * (error.abs() - self.pressure_overlap * emptying).max(0.0);
+        let overlap = if error < 0.0 { self.overlap_of_emptying() } else { self.pressure_overlap };
+        let beyond = self.overlap_steepness * (error.abs() - overlap).max(0.0);
         at.gauge_pressure + error.signum() * beyond.min(error.abs())
     }
 
@@ -133,7 +141,7 @@ impl Effect for ValveDeadBand {
         if self.pressure_overlap > 0.0 {
             let emptying = match self.emptying_excess {
                 0.0 => String::new(),
-                excess => format!(", or {:.3} bar where it empties", 1e-5 * self.pressure_overlap * (1.0 + excess)),
+                _ => format!(" where it fills and {:.3} bar where it empties", 1e-5 * self.overlap_of_emptying()),
             };
             parts.push(format!("no port opens for errors below {:.3} bar{emptying}", 1e-5 * self.pressure_overlap));
         }

@@ -43,6 +43,18 @@ def test_pairs_of_which_neither_leads_alone_are_named(sinew, tmp_path, note):
     assert all(count >= 3 for count in named.values()), named
 
 
+@pytest.mark.parametrize(("severity", "shows"), [(1, True), (0, False)])
+def test_of_two_effects_the_generator_knows_which_show(severity, shows, tmp_path, note):
+    """At size zero neither does beside the other: what is left is the muscle, which no polynomial quite is."""
+    options = ["--effects", "valve_dead_time+bladder_stiffness:3", "--severity", severity, "--out", tmp_path]
+    run(sys.executable, HIDDEN_EFFECTS / "generate.py", "--seed", 5150, *options)
+    truths = [json.loads(truth.read_text()) for truth in sorted((tmp_path / "truths").glob("*.json"))]
+    each = np.array([truth["visibility_of_each"] for truth in truths])
+    note(f"Shown by each of two effects at size {severity}, in noise levels: {each.round(1).tolist()}")
+    assert each.shape == (3, 2)
+    assert np.all(each > 5) if shows else np.all(each < 5)
+
+
 @pytest.fixture(scope="module")
 def same_forms(sinew, tmp_path_factory):
     """Truths of recordings of every effect in the tool's own equations, by name of the case, and their folder."""

@@ -15,9 +15,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
-from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from effects import KNOWN
@@ -26,6 +24,7 @@ from pairs import NEEDS_COLUMN_IN_PAIR, PAIRS
 from plant import STEP, VALVE_GAIN, Experiment, Specimen, holding_pressure, simulate
 from textbook import SAME_FORM, true_parameters
 from unknown import UNKNOWN
+from visibility import add_visibility
 
 FORMS = {**KNOWN, **UNKNOWN}
 NEAR_OR_FAR = {
@@ -35,7 +34,6 @@ NEAR_OR_FAR = {
     **dict.fromkeys(SINCE_HELD, "near"),
 }
 DRIVEN_SHARE = 0.25
-TOLERANCE = 0.03  # of the preset's coefficients, that of the tool by default
 MOST_DRAWS = 20
 CONTRACTION = (0.045, 0.165)  # m, of commands at rest; overshoot takes some more
 COMMAND_STEP = 0.00025  # V, of the logger
@@ -109,7 +107,7 @@ class Case:
     specimen: Specimen
     noise: dict
     plans: list = field(default_factory=list)
-    visibility: float | None = None
+    visibility: list = field(default_factory=list)
 
 
 # --- Commands ---------------------------------------------------------------------------------------------------------
@@ -332,15 +330,10 @@ def write_recording(path, columns):
             file.write(",".join(cells) + "\n")
 
 
-def true_signals(course_run, times):
-    quantities = {"gauge_pressure": "pressure", "contraction": "contraction", "force": "force"}
-    return {name: CubicSpline(course_run.time, getattr(course_run, q))(times) for name, q in quantities.items()}
-
-
 def recorded(random, case, plan, run):
     """Columns as the logger has them, and by how much each measured one is off what ideal sensors show."""
     times = sample_times(random, plan, run.time[-1])
-    signals = true_signals(run, times)
+    signals = run.signals(times)
     grid = STEP * np.arange(len(plan.experiment.command))
     columns, errors = {"time": times}, {}
     for name in plan.columns:
@@ -352,54 +345,6 @@ def recorded(random, case, plan, run):
     if plan.mass is not None:
         columns["load_mass"] = np.full(len(times), plan.mass)
     return columns, errors
-
-
-def reference(plan, run, **factors):
-    """The preset muscle in place of the true one; an imposed motion is taken as the sensor shows it."""
-    motion = plan.experiment.motion
-    if motion is not None:
-        motion = np.interp(STEP * np.arange(len(motion)), run.time, run.contraction)
-    return Experiment(Specimen(**factors), plan.experiment.command, plan.mass, motion)
-
-
-def add_visibility(cases):
-    """How much of an effect shows beyond what the tolerance allows, in noise levels, in the signal where it shows most.
-
-    The best preset muscle within the tolerance is found by linear least squares on signals without noise.
-    """
-    pairs = [(plan, run) for case, runs in cases for plan, run in zip(case.plans, runs, strict=True)]
-    small = 0.01
-    changes = [{}, *one_coefficient_more(small)]
-    references = iter(simulate([reference(*pair, **change) for pair in pairs for change in changes]))
-    for case, runs in cases:
-        rows = {}
-        for plan, run in zip(case.plans, runs, strict=True):
-            own = [next(references) for _ in changes]
-            at = run.time[::10]
-            truth, nominal, *changed = (true_signals(course_run, at) for course_run in (run, *own))
-            inputs = {"command"} if plan.mass else {"command", "contraction"}
-            for name in set(plan.columns) - inputs:
-                slopes = [(other[name] - nominal[name]) / small for other in changed]
-                block = np.stack([truth[name] - nominal[name], *slopes], axis=1) / case.noise[name]["level"]
-                rows.setdefault(name, []).append(block)
-        rows = {name: np.concatenate(blocks) for name, blocks in rows.items()}
-        case.visibility = remaining(rows)
-
-
-def one_coefficient_more(share):
-    """Changes of a specimen, each of one of its coefficients."""
-    changes = [{"damping": 1 + share}]
-    for name in ("area", "elastic"):
-        nominal = getattr(Specimen, name)
-        changes += [{name: tuple(nominal + share * unit)} for unit in np.eye(len(nominal))]
-    return changes
-
-
-def remaining(rows):
-    """Largest rms per signal of the first column after the best bounded combination of the others is taken off."""
-    together = np.concatenate(list(rows.values()))
-    best = lsq_linear(together[:, 1:], together[:, 0], bounds=(-TOLERANCE, TOLERANCE)).x
-    return float(max(np.sqrt(np.mean((block[:, 0] - block[:, 1:] @ best) ** 2)) for block in rows.values()))
 
 
 def is_feasible(run):
@@ -459,7 +404,8 @@ def write_case(random, name, case, runs, out):
         "forms": [form.__name__ for form, _ in case.hidden],
         "near_or_far": ["same" if case.kind.same_form else NEAR_OR_FAR.get(form) for form, _ in case.hidden],
         "sizes": [{key: plain(value) for key, value in size.items()} for _, size in case.hidden],
-        "visibility": case.visibility,
+        "visibility": case.visibility[0] if case.visibility else None,
+        "visibility_of_each": case.visibility[1:],
         "same_form": case.kind.same_form,
         "parameters": parameters_of(case),
         "own_parameters": case.specimen.parameters(),

@@ -7,6 +7,7 @@ for a command held over a step; dry friction and the like: exact in displacement
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 GRAVITY = 9.81
 STEP = 5e-4
@@ -60,6 +61,11 @@ class Course:
     contraction: np.ndarray
     force: np.ndarray
 
+    def signals(self, times):
+        """By the names of their columns, at any times."""
+        quantities = {"gauge_pressure": self.pressure, "contraction": self.contraction, "force": self.force}
+        return {name: CubicSpline(self.time, values)(times) for name, values in quantities.items()}
+
 
 def area(x, factors=Specimen.area):
     return AREA[0] * factors[0] + AREA[1] * factors[1] * x
@@ -109,14 +115,15 @@ class Now:
 def forms_together(experiments):
     """One object per form of an effect that occurs, with the columns where it acts.
 
-    Neighbouring columns become a slice, which numpy handles faster than a list of indices.
+    They act in the order of their names, whatever else is in the batch. Neighbouring columns become a slice, which
+    numpy handles faster than a list of indices.
     """
     found = {}
     for column, experiment in enumerate(experiments):
         for form, size in experiment.hidden:
             found.setdefault(form, []).append((column, size))
     forms = []
-    for form, members in found.items():
+    for form, members in sorted(found.items(), key=lambda item: item[0].__name__):
         columns, sizes = zip(*members, strict=True)
         contiguous = columns[-1] - columns[0] + 1 == len(columns)
         at = slice(columns[0], columns[-1] + 1) if contiguous else np.array(columns)

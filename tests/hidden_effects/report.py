@@ -77,7 +77,7 @@ class Score:
         return [line for part in [*parts, self.of_coverage, self.of_time] for line in part()]
 
     def of_singles(self):
-        visible = [o for o in self.single if (o.detail["visibility"] or 0) > VISIBLE]
+        visible = [o for o in self.single if all_show(o)]
         return [
             *share(NAMED, self.single, lambda o: o.named),
             *self.of_forms(),
@@ -109,9 +109,12 @@ class Score:
         ]
 
     def of_pairs(self):
+        visible = [o for o in self.pairs if all_show(o)]
         return [
             *share(BOTH_NAMED, self.pairs, lambda o: o.both_named),
+            *share("two effects that each show beside the other: both named", visible, lambda o: o.both_named),
             *share(FIRST_OF_TWO, self.pairs, lambda o: o.first_right),
+            *share("two effects that each show beside the other: first cause right", visible, lambda o: o.first_right),
             *share("two effects: a cause named that is not there", self.pairs, names_a_stranger),
         ]
 
@@ -180,6 +183,17 @@ class Score:
         return rows
 
 
+def all_show(o):
+    """Whether the effect of a case shows, or each of two beside the other."""
+    return min(shown(o), default=0) > VISIBLE
+
+
+def shown(o):
+    """In noise levels how much the effect of a case shows, or each of two beside the other; empty where not known."""
+    alone, each = o.detail["visibility"], o.detail.get("visibility_of_each", [])
+    return each or ([] if alone is None else [alone])
+
+
 def is_wrong(o):
     return o.causes and not o.first_right
 
@@ -214,7 +228,7 @@ def print_failures(score):
     for o in score.outcomes:
         if not score.is_right(o):
             recordings = [(r["load_mass"], r["excitation"], *r["columns"]) for r in o.detail["recordings"]]
-            shows = "" if o.detail["visibility"] is None else f" visibility {o.detail['visibility']:.1f},"
+            shows = f" visibility {' and '.join(f'{value:.1f}' for value in shown(o))}," if shown(o) else ""
             hidden = f"{o.truth}/{'+'.join(o.detail['forms'])}" + (f" ({o.near_or_far})" if o.near_or_far else "")
             print(f"  {o.name} {hidden} -> {o.answer} ({o.verdict}),{shows} {recordings}")
 

@@ -131,7 +131,7 @@ class KnownPullCreep(UnevenPullCreep):
 
 
 class PressureCreep(Plant):
-    """Threads that give way under the pressure, 9 mm and 4 mm at 2 bar, settled at the start and half of that known."""
+    """A braid that goes on widening under the pressure, by 9 mm and 4 mm at 2 bar, settled at the start and half of that known."""
 
     own_scales = 0.01, 0.01
 
