@@ -40,6 +40,7 @@ impl Effect for ContractionSensorGain {
         further_forms: &[],
         refinements: &[("contraction_sensor_gain.bend", &[0.005])],
     };
+    const ENDS_INSIDE: &'static [&'static str] = &["contraction_sensor_gain.bend"];
 
     fn is_neutral(&self) -> bool {
         self.relative_error == 0.0 && self.bend == 0.0

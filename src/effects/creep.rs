@@ -134,6 +134,14 @@ impl Effect for Creep {
     /// Both drifts of the contraction, contraction and pull where nothing drifts, the drift of the pull, how far both springs are stretched,
     /// and the relative pressure at which nothing drifts.
     const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e3, 1e3, 0.1, 0.1, 1.0];
+    const ENDS_INSIDE: &'static [&'static str] = &[
+        "creep.amplitude_1",
+        "creep.amplitude_2",
+        "creep.pull_amplitude",
+        "creep.pressure_drift_1",
+        "creep.pressure_drift_2",
+        "creep.return_ratio",
+    ];
 
     fn is_neutral(&self) -> bool {
         let Self { amplitude_1, amplitude_2, pull_amplitude, pressure_drift_1, pressure_drift_2, .. } = *self;
@@ -144,7 +152,7 @@ impl Effect for Creep {
 
     // The second element may be a small part of the whole, and fast.
     fn is_plausible(&self) -> bool {
-        self.time_1 > SLOW && [self.amplitude_1, self.amplitude_2, self.pull_amplitude].iter().all(|a| *a > AHEAD)
+        self.time_1 > SLOW
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {

@@ -68,6 +68,7 @@ impl Effect for EndEffects {
         further_forms: &[&[("end_effects.taper", &[0.15]), ("end_effects.taper_length", &[0.02, 0.05])]],
         refinements: &[("end_effects.low_pressure_excess", &[0.05]), ("end_effects.growth", &[0.3])],
     };
+    const ENDS_INSIDE: &'static [&'static str] = &["end_effects.growth"];
 
     fn is_neutral(&self) -> bool {
         [self.excess, self.low_pressure_excess, self.taper] == [0.0; 3]

@@ -118,6 +118,7 @@ impl Effect for FlowLimit {
             ("flow_limit.exponent", &[0.3]),
         ],
     };
+    const ENDS_INSIDE: &'static [&'static str] = &["flow_limit.critical_ratio"];
 
     fn is_neutral(&self) -> bool {
         self.filling >= NONE && self.emptying >= NONE

@@ -64,6 +64,7 @@ impl Effect for ForceGain {
         ],
         refinements: &[("force_gain.bend", &[0.005]), ("force_gain.elastic_share", &[0.5])],
     };
+    const ENDS_INSIDE: &'static [&'static str] = &["force_gain.bend"];
 
     fn is_neutral(&self) -> bool {
         [self.relative_error, self.second, self.third, self.bend] == [0.0; 4]

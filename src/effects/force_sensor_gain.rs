@@ -41,6 +41,7 @@ impl Effect for ForceSensorGain {
         further_forms: &[],
         refinements: &[("force_sensor_gain.bend", &[0.005])],
     };
+    const ENDS_INSIDE: &'static [&'static str] = &["force_sensor_gain.bend"];
 
     fn is_neutral(&self) -> bool {
         self.relative_error == 0.0 && self.bend == 0.0

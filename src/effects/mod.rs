@@ -164,6 +164,8 @@ pub trait Effect: Declared + Default {
     const DESCRIPTION: Description;
     /// Usual sizes of the states that it adds to the plant, one each.
     const STATE_SCALES: &'static [f64] = &[];
+    /// Parameters whose bounds are neither neutral nor limits of nature: a fit that ends there wanted more, and did not find the cause.
+    const ENDS_INSIDE: &'static [&'static str] = &[];
 
     /// Whether it changes nothing, whatever its shape parameters are.
     fn is_neutral(&self) -> bool;
@@ -171,7 +173,7 @@ pub trait Effect: Declared + Default {
     fn rests(&self) -> bool {
         self.is_neutral()
     }
-    /// Whether its values are such as the cause can have: fits may try more, and what ends at a bound was not found.
+    /// Whether its values are such as the cause can have, where [`Effect::ENDS_INSIDE`] does not say it: fits may try more.
     fn is_plausible(&self) -> bool {
         true
     }
@@ -296,6 +298,14 @@ pub trait Effect: Declared + Default {
     }
 }
 
+fn ends_inside<E: Effect>(effect: &E) -> bool {
+    let mut inside = true;
+    effect.visit(&mut |variable, value| {
+        inside &= !E::ENDS_INSIDE.contains(&variable.name) || (variable.min < value && value < variable.max);
+    });
+    inside
+}
+
 /// A hook of all effects that have states, one after the other; `states` are those of all effects.
 macro_rules! chained {
     ($doc:literal; $hook:ident; $($field:ident: $Effect:ident;)*) => {
@@ -342,7 +352,7 @@ macro_rules! effects {
 
             /// Whether the values of the effect with this name are such as its cause can have.
             pub fn is_plausible(&self, name: &str) -> bool {
-                true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible()))*
+                true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible() && ends_inside(&self.$field)))*
             }
 
             /// Has all effects be as they are in one of several recordings, by its number from 1.
@@ -611,5 +621,21 @@ impl Effects {
             group += 1;
         }
         all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Effects;
+
+    #[test]
+    fn what_ends_at_a_bound_is_no_cause_but_for_limits_of_nature() {
+        let neutral = Effects::default();
+        assert!(Effects::DESCRIPTIONS.iter().all(|effect| neutral.is_plausible(effect.name)));
+        let mut creeps = neutral;
+        (creeps.creep.pull_amplitude, creeps.creep.settled_share) = (0.9, 1.0);
+        assert!(creeps.is_plausible("creep"));
+        creeps.creep.pull_amplitude = 1.0;
+        assert!(!creeps.is_plausible("creep") && creeps.is_plausible("leakage"));
     }
 }

@@ -29,7 +29,7 @@ crate::variables::variables! {
         /// Power of the pull with which it stretches; at least 0.3 without a toe
         exponent: f64 = 1.0, ONE, (-3.0..=3.0);
         /// Pull beyond which it hardens
-        toe_force: f64 = 0.0, NEWTON, (0.0..=5e3);
+        toe_force: f64 = 0.0, NEWTON, (0.0..=MOST_TOE);
     }
 }
 
@@ -40,6 +40,8 @@ const LEAST_EXPONENT: f64 = 0.3;
 /// Pull in N below which a toe is none, and the one that makes up for a smaller power.
 const LEAST_TOE: f64 = 1e-3;
 const OWN_TOE: f64 = 10.0;
+/// Toe force in N from which on nothing is loaded beyond it.
+const MOST_TOE: f64 = 5e3;
 
 impl SeriesElasticity {
     /// Way in m that gives way at a pull in N, for a compliance in m/N.
@@ -88,7 +90,7 @@ impl Effect for SeriesElasticity {
     }
 
     fn is_plausible(&self) -> bool {
-        self.exponent > LEAST_EXPONENT || self.toe_force > OWN_TOE
+        (self.exponent > LEAST_EXPONENT || self.toe_force > OWN_TOE) && self.toe_force < MOST_TOE
     }
 
     fn rests(&self) -> bool {

@@ -51,6 +51,7 @@ impl Effect for ValveGain {
         further_forms: &[],
         refinements: &[("valve_gain.bend", &[0.003])],
     };
+    const ENDS_INSIDE: &'static [&'static str] = &["valve_gain.bend"];
 
     fn is_neutral(&self) -> bool {
         self.relative_error == 0.0 && self.bend == 0.0 && self.slope_change == 0.0
