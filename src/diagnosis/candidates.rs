@@ -23,11 +23,14 @@ const OF_POLYNOMIAL: [(&str, f64); 8] = [
     ("virtual_area.elastic_2", 1.0),
     ("virtual_area.elastic_3", 1.0),
 ];
-/// Corrections of shape with their expected size in units of the tolerance: no polynomial is quite the muscle.
+/// Correction of shape with its expected size in units of the tolerance: no polynomial is quite the muscle.
 const SHAPE_OF_POLYNOMIAL: [(&str, f64); 1] = [("muscle.area_bend", 0.1)];
-/// The same of any other force, whose coefficients may all act alike or cancel each other, and of one that is off as a whole.
+/// Corrections of a muscle that is off as a whole.
 const AS_A_WHOLE: [(&str, f64); 2] = [("muscle.area_scale", 1.0), ("muscle.elastic_scale", 1.0)];
-const SHAPE_AS_A_WHOLE: [(&str, f64); 3] =
+/// The same as of a polynomial, whose slope is not free then.
+const SHAPE_AS_A_WHOLE: [(&str, f64); 2] = [("muscle.area_tilt", 0.1), ("muscle.area_bend", 0.1)];
+/// Corrections of shape of any other force, whose coefficients may all act alike or cancel each other.
+const SHAPE_OF_COURSE: [(&str, f64); 3] =
     [("muscle.area_tilt", 0.4), ("muscle.area_bend", 0.2), ("muscle.elastic_tilt", 0.6)];
 /// Of a fit that only has to show what a hypothesis is worth.
 const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
@@ -295,27 +298,35 @@ pub struct Start {
 /// How a nominal muscle may be off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Off {
+    /// Area and elastic force as a whole.
+    AsAWhole,
     /// Each coefficient of its polynomials by itself.
     Each,
     /// Area and elastic force as a whole, and a little in their course.
-    AsAWhole,
+    InCourse,
 }
 
 impl Off {
-    /// The ways in which the coefficients of a model may be off, the one that allows more first.
-    pub fn of(nominal: &Parameters) -> &'static [Self] {
+    /// The ways in which the coefficients of a model may be off, the one that allows most last.
+    pub fn ways(nominal: &Parameters) -> &'static [Self] {
         // A piston of constant area has no slope that could be off.
         let is_polynomial = nominal.muscle.force_model == ForceModelName::VirtualArea
             && nominal.force_models.virtual_area.area_1 != 0.0;
-        if is_polynomial { &[Self::Each, Self::AsAWhole] } else { &[Self::AsAWhole] }
+        if is_polynomial { &[Self::AsAWhole, Self::Each] } else { &[Self::InCourse] }
+    }
+
+    /// The way that allows most.
+    pub fn most(nominal: &Parameters) -> Self {
+        Self::ways(nominal).last().copied().unwrap_or(Self::InCourse)
     }
 }
 
 /// Corrections that every fit may make of a nominal model that is good to `tolerance`, with their bounds and priors.
 pub fn corrections(nominal: &Parameters, tolerance: f64, off: Off) -> Vec<(&'static Variable, Free)> {
     let (own, shapes): (&[_], &[_]) = match off {
-        Off::Each => (&OF_POLYNOMIAL, &SHAPE_OF_POLYNOMIAL),
         Off::AsAWhole => (&AS_A_WHOLE, &SHAPE_AS_A_WHOLE),
+        Off::Each => (&OF_POLYNOMIAL, &SHAPE_OF_POLYNOMIAL),
+        Off::InCourse => (&AS_A_WHOLE, &SHAPE_OF_COURSE),
     };
     let relative = own.iter().chain(&COEFFICIENTS).filter_map(|(name, share)| {
         let (variable, start) = declared(nominal, name);
@@ -498,6 +509,23 @@ impl<'a> Bench<'a> {
         let parameters = neutralised(&fitted.parameters, effect);
         let residuals = self.data.residuals(&parameters)?;
         Some(self.fitted(&fitted.hypothesis.without(effect.name), parameters, residuals))
+    }
+
+    /// What the corrections of a fit take off its odds: how far they are from what was expected, and how much more precisely the data know
+    /// them than that (Laplace's approximation of the evidence, D. MacKay 1992, doi 10.1162/neco.1992.4.3.415).
+    pub fn price(&self, fitted: &Fitted) -> f64 {
+        let weights = self.data.weights_beside_structure();
+        let slopes = self.slopes_at(&fitted.parameters, &fitted.residuals);
+        let expected = self.corrections.iter().zip(slopes).filter_map(|((variable, correction), slope)| {
+            let (mean, deviation) = correction.prior?;
+            let off = (declared(&fitted.parameters, variable.name).1 - mean) / deviation;
+            Some((off, weighted(&slope, &weights).into_iter().map(|slope| slope * deviation).collect()))
+        });
+        let (off, columns): (Vec<f64>, Vec<Vec<f64>>) = expected.unzip();
+        let known = normal_matrix(&columns) + DMatrix::identity(columns.len(), columns.len());
+        // Of a positive definite matrix; its determinant is the squared product of the factor's diagonal.
+        let precision: f64 = known.cholesky().map_or(0.0, |factor| factor.l().diagonal().iter().map(|d| d.ln()).sum());
+        0.5 * off.iter().map(|off| off * off).sum::<f64>() + precision
     }
 
     fn slopes_at(&self, model: &Parameters, residuals: &[f64]) -> Slopes {

@@ -29,7 +29,7 @@ use crate::{Error, Result};
 use candidates::{Bench, Fitted, Off, Part, recordings_for};
 use residuals::Data;
 use residuals::Scope;
-use selection::{Chosen, Judged, Search};
+use selection::{Chosen, Judged, LEAST_EVIDENCE, Search, odds_between_ways};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -140,7 +140,7 @@ pub struct Diagnosis {
 /// Diagnoses recordings against a nominal model.
 ///
 /// `tolerance` is the relative error of the nominal coefficients below which nothing is called wrong; `done` is told
-/// after each of the `1 + candidates` fits, of which there may be two rounds, the second perhaps without its candidates. What is set
+/// after each of the `1 + candidates` fits, of which there may be two rounds, the second perhaps with the first of them alone. What is set
 /// anew in each recording is found where these are [`numbered`](crate::measurement::numbered).
 ///
 /// # Errors
@@ -161,22 +161,52 @@ pub fn diagnose(
     };
     let data = Data::new(recordings, nominal, tolerance)?;
     let thinned = thinned(recordings);
-    let searched = |off: Off, known: Option<&Chosen>| {
+    let mut found: Option<Found> = None;
+    for off in Off::ways(nominal) {
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;
-        let mut bench = Bench::new(for_fits, nominal, tolerance, off);
-        let chosen = search(&mut bench, known, done);
-        Ok(chosen.map(|chosen| (bench, chosen)))
-    };
-    let ways = Off::of(nominal);
-    let (mut bench, mut chosen) = searched(ways[0], None)?.ok_or_else(cannot_follow)?;
-    // Coefficients that are each off by themselves can stand for a good part of a further cause.
-    if let Some(off) = ways.get(1).filter(|_| chosen.leaves_something(&bench.data))
-        && let Some(better) = searched(*off, Some(&chosen))?.filter(|(_, other)| other.adds_to(&chosen, &bench.data))
-    {
-        (bench, chosen) = better;
+        let mut bench = Bench::new(for_fits, nominal, tolerance, *off);
+        let baseline = baseline(&mut bench).ok_or_else(cannot_follow)?;
+        done("nominal");
+        if found.as_ref().is_some_and(|found| found.is_the_answer_beside(&bench, &baseline)) {
+            break;
+        }
+        let chosen = Search::new(&mut bench, baseline).run(done).ok_or_else(cannot_follow)?;
+        let next = Found { bench, chosen };
+        found = Some(found.filter(|found| found.beats(&next)).unwrap_or(next));
     }
+    let Found { bench, chosen } = found.ok_or_else(cannot_follow)?;
     answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
+}
+
+/// What was found where the coefficients of the nominal model may be off in one way.
+struct Found<'a> {
+    bench: Bench<'a>,
+    chosen: Chosen,
+}
+
+impl Found<'_> {
+    /// Whether nothing better can be found where the coefficients may be off in a way that allows more: nothing is wrong, or one cause
+    /// explains everything, and better than such coefficients alone.
+    fn is_the_answer_beside(&self, bench: &Bench, baseline: &Fitted) -> bool {
+        let is_one = || self.causes() == 1 && self.odds_against(bench, baseline) > LEAST_EVIDENCE;
+        self.chosen.leaves_nothing(&self.bench.data) && (self.chosen.verdict == Verdict::Nominal || is_one())
+    }
+
+    /// Whether causes are named here that are better than what was found where the coefficients may be off in a way that allows more. Each
+    /// cause more must be worth it.
+    fn beats(&self, other: &Self) -> bool {
+        let more = self.causes() as f64 - other.causes() as f64;
+        self.causes() > 0 && self.odds_against(&other.bench, &other.chosen.best) > LEAST_EVIDENCE * more
+    }
+
+    fn causes(&self) -> usize {
+        self.chosen.model.hypothesis.parts.len()
+    }
+
+    fn odds_against(&self, bench: &Bench, fitted: &Fitted) -> f64 {
+        odds_between_ways(&self.bench, &self.chosen.best, (bench, fitted))
+    }
 }
 
 /// The recordings with as many samples as fits need.
@@ -186,18 +216,11 @@ fn thinned(recordings: &[Recording]) -> Vec<Recording> {
     recordings.iter().map(|recording| recording.thinned(period.clamp(PERIODS.0, PERIODS.1))).collect()
 }
 
-/// The causes of what the nominal model leaves, beside those that are known; `None` where it cannot be simulated, or where
-/// nothing beside the known ones is worth looking for.
-fn search(bench: &mut Bench, known: Option<&Chosen>, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
+/// The nominal model with its corrections, and noise judged from it; `None` where it cannot be simulated.
+fn baseline(bench: &mut Bench) -> Option<Fitted> {
     let first = bench.baseline()?;
     bench.refine_noise(&first.residuals);
-    let baseline = bench.baseline()?;
-    done("nominal");
-    let search = Search::new(bench, baseline);
-    match known {
-        Some(known) => search.run_beside(known, done),
-        None => search.run(done),
-    }
+    bench.baseline()
 }
 
 /// The choice in words and figures, its errors on all samples.

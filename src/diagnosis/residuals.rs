@@ -251,13 +251,22 @@ impl<'a> Data<'a> {
     /// Factor per residual that makes it count as much as it is worth: slow noise and frequent samples count less.
     /// Residuals out of scope count nothing.
     pub fn weights(&self, scope: Scope) -> Vec<f64> {
-        let of = |segment: &Segment| {
-            let noise = self.noise[&segment.signal];
-            1.0 / (noise.level * noise.inflation.sqrt())
-        };
+        self.weights_by(scope, |_, noise| noise.inflation)
+    }
+
+    /// The same for all samples, where there is the structural error of a sound nominal model as well, one for each block.
+    pub fn weights_beside_structure(&self) -> Vec<f64> {
+        self.weights_by(Scope::All, |segment, noise| {
+            let per_block = BLOCK / self.recordings[segment.recording].period();
+            noise.inflation + per_block * self.structure(segment.signal)
+        })
+    }
+
+    fn weights_by(&self, scope: Scope, variance: impl Fn(&Segment, Noise) -> f64) -> Vec<f64> {
         let mut weights = Vec::new();
         for segment in &self.segments {
-            let weight = of(segment);
+            let noise = self.noise[&segment.signal];
+            let weight = 1.0 / (noise.level * variance(segment, noise).sqrt());
             weights.extend(segment.samples.iter().map(|&k| if self.is_in(scope, segment, k) { weight } else { 0.0 }));
         }
         weights

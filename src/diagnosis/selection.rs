@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Evidence (natural logarithm of odds) that an effect must have: e¹⁰, about 22 000 to 1.
-const LEAST_EVIDENCE: f64 = 10.0;
+pub const LEAST_EVIDENCE: f64 = 10.0;
 /// Odds up to which a rival explains the data as well as the best: 20 to 1, in natural logarithm.
 const RIVAL: f64 = 3.0;
 /// Share of the error beyond noise that the named causes together must explain: of all samples, and of those that the fit did
@@ -86,8 +86,8 @@ pub struct Chosen {
     pub model: Fitted,
     /// Whether that fit saw all samples, since the first ones tell too little.
     pub saw_all: bool,
-    /// What the best fit to all samples leaves; nothing where no cause is named.
-    left: Vec<Loss>,
+    /// The best fit to all samples; that of the baseline where no cause is named.
+    pub best: Fitted,
     /// Per effect of the model, in its order: effects that could stand in its place.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The hypotheses with these effects in their place.
@@ -172,23 +172,25 @@ impl Chosen {
         !self.model.hypothesis.parts.is_empty()
     }
 
-    /// Whether causes are named, and leave more than a sound model may even where they were fitted to all samples.
-    pub fn leaves_something(&self, data: &Data) -> bool {
-        is_unsound(&self.left, data)
+    /// Whether the best fit to all samples leaves no more than a sound model may.
+    pub fn leaves_nothing(&self, data: &Data) -> bool {
+        !is_unsound(&self.best.losses, data)
     }
+}
 
-    /// Whether this one has the causes of another one and more, explains everything, and foretells samples that neither
-    /// fit saw better beyond doubt.
-    pub fn adds_to(&self, other: &Self, data: &Data) -> bool {
-        let explains = matches!(self.verdict, Verdict::Explained | Verdict::Ambiguous) && !self.saw_all;
-        let (causes, fewer) = (&self.model.hypothesis, &other.model.hypothesis.parts);
-        let mut known = fewer.iter().zip(&other.alternatives);
-        let unseen = |chosen: &Self| data.losses(&chosen.model.residuals, Scope::HeldOut);
-        explains
-            && causes.parts.len() > fewer.len()
-            && known.all(|(part, rivals)| causes.has(part.effect.name) || rivals.iter().any(|rival| causes.has(rival)))
-            && gain(&unseen(other), &unseen(self)) > LEAST_EVIDENCE
-    }
+/// Logarithm of the odds for a fit against another one that lets the coefficients of the nominal model be off in another way; the
+/// likelihoods are those of the other one's data.
+pub fn odds_between_ways(bench: &Bench, fitted: &Fitted, other: (&Bench, &Fitted)) -> f64 {
+    let [own, others] = [fitted, other.1].map(|fitted| other.0.data.losses(&fitted.residuals, Scope::All));
+    // The whiter residuals say how much a sample is worth.
+    let effective: Vec<f64> = own.iter().zip(&others).map(|(a, b)| a.effective.max(b.effective)).collect();
+    let as_whitest = |losses: Vec<Loss>| -> Vec<Loss> {
+        losses.into_iter().zip(&effective).map(|(loss, effective)| Loss { effective: *effective, ..loss }).collect()
+    };
+    let more = fitted.hypothesis.size() as f64 - other.1.hypothesis.size() as f64;
+    let samples: f64 = effective.iter().sum();
+    gain(&as_whitest(others), &as_whitest(own)) - 0.5 * more * samples.max(2.0).ln() - bench.price(fitted)
+        + other.0.price(other.1)
 }
 
 /// The search for the causes of what a baseline leaves.
@@ -221,22 +223,6 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         let singles = if self.may_show() { self.refined_best(singles) } else { singles };
         self.go_on(vec![singles.clone()], singles, &from)
-    }
-
-    /// Finds causes beside those that another search named, which let coefficients be off otherwise; `None` where that is not
-    /// worth it.
-    pub fn run_beside(mut self, known: &Chosen, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
-        let anew = |fitted: &Fitted| {
-            let start = fitted.hypothesis.at_work_in(&self.baseline.parameters, &fitted.parameters);
-            Some(self.finished(self.judge(self.bench.rough_fit(&fitted.hypothesis, &start)?)))
-        };
-        let first = [&known.model].into_iter().chain(&known.rivals).filter_map(anew).collect();
-        let levels = vec![self.judged_anew(first)];
-        if !self.is_worth_going_on(&levels) {
-            return None;
-        }
-        let from = best_of_each(&self.starts(done));
-        self.go_on(levels, known.singles.clone(), &from)
     }
 
     /// Adds levels of one effect more each while that is worth it, and chooses.
@@ -586,7 +572,7 @@ impl<'a, 'b> Search<'a, 'b> {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
             Some(Chosen {
                 verdict,
-                left: Vec::new(),
+                best: self.baseline.clone(),
                 model,
                 saw_all: false,
                 alternatives: Vec::new(),
@@ -617,7 +603,7 @@ impl<'a, 'b> Search<'a, 'b> {
             Verdict::PartlyExplained
         };
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
-        Some(Chosen { verdict, model, left: best.fitted.losses, saw_all: !holds_out, alternatives, rivals, singles })
+        Some(Chosen { verdict, model, best: best.fitted, saw_all: !holds_out, alternatives, rivals, singles })
     }
 
     /// A hypothesis fitted to the samples that fits may see, and whether it foretells the others; or, where these tell too little,

@@ -243,7 +243,7 @@ pub fn plan(
     limits: &Limits,
     done: &(dyn Fn(&str) + Sync),
 ) -> Result<Plan> {
-    let corrections = corrections(nominal, tolerance, Off::of(nominal)[0]);
+    let corrections = corrections(nominal, tolerance, Off::most(nominal));
     let bank = Bank::new(&task.rivals, nominal, slack(corrections), limits, done);
     let experiments = experiments(&bank, limits);
     let mut best: Option<Choice> = None;
