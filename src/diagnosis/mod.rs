@@ -15,6 +15,7 @@ mod remaining;
 pub mod report;
 mod residuals;
 mod selection;
+mod ways;
 
 pub use candidates::FittedParameter;
 pub use correction::Correction;
@@ -29,9 +30,10 @@ use crate::{Error, Result};
 use candidates::{Bench, Fitted, Off, Part, recordings_for};
 use residuals::Data;
 use residuals::Scope;
-use selection::{Chosen, Judged, LEAST_EVIDENCE, Search, odds_between_ways};
+use selection::{Chosen, Judged, MOST_EFFECTS, Search};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use ways::Found;
 
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
@@ -168,45 +170,16 @@ pub fn diagnose(
         let mut bench = Bench::new(for_fits, nominal, tolerance, *off);
         let baseline = baseline(&mut bench).ok_or_else(cannot_follow)?;
         done("nominal");
-        if found.as_ref().is_some_and(|found| found.is_the_answer_beside(&bench, &baseline)) {
+        let most = found.as_ref().map_or(MOST_EFFECTS, |found| found.most_beside(&bench, &baseline));
+        if most == 0 {
             break;
         }
-        let chosen = Search::new(&mut bench, baseline).run(done).ok_or_else(cannot_follow)?;
+        let chosen = Search::new(&mut bench, baseline, most).run(done).ok_or_else(cannot_follow)?;
         let next = Found { bench, chosen };
         found = Some(found.filter(|found| found.beats(&next)).unwrap_or(next));
     }
     let Found { bench, chosen } = found.ok_or_else(cannot_follow)?;
     answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
-}
-
-/// What was found where the coefficients of the nominal model may be off in one way.
-struct Found<'a> {
-    bench: Bench<'a>,
-    chosen: Chosen,
-}
-
-impl Found<'_> {
-    /// Whether nothing better can be found where the coefficients may be off in a way that allows more: nothing is wrong, or one cause
-    /// explains everything, and better than such coefficients alone.
-    fn is_the_answer_beside(&self, bench: &Bench, baseline: &Fitted) -> bool {
-        let is_one = || self.causes() == 1 && self.odds_against(bench, baseline) > LEAST_EVIDENCE;
-        self.chosen.leaves_nothing(&self.bench.data) && (self.chosen.verdict == Verdict::Nominal || is_one())
-    }
-
-    /// Whether causes are named here that are better than what was found where the coefficients may be off in a way that allows more. Each
-    /// cause more must be worth it.
-    fn beats(&self, other: &Self) -> bool {
-        let more = self.causes() as f64 - other.causes() as f64;
-        self.causes() > 0 && self.odds_against(&other.bench, &other.chosen.best) > LEAST_EVIDENCE * more
-    }
-
-    fn causes(&self) -> usize {
-        self.chosen.model.hypothesis.parts.len()
-    }
-
-    fn odds_against(&self, bench: &Bench, fitted: &Fitted) -> f64 {
-        odds_between_ways(&self.bench, &self.chosen.best, (bench, fitted))
-    }
 }
 
 /// The recordings with as many samples as fits need.

@@ -63,10 +63,13 @@ fn unscaled(reading: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
 
 /// By how much a value is more in the recording with a number from 1, given that for the second and the third; in all others by nothing.
 pub(crate) fn of_recording(number: f64, [second, third]: [f64; 2]) -> f64 {
-    match number.round() {
-        2.0 => second,
-        3.0 => third,
-        _ => 0.0,
+    // Comparisons, as rounding is a call where the processor may be an old one, and this is asked for in every step of a simulation.
+    if (1.5..2.5).contains(&number) {
+        second
+    } else if (2.5..3.5).contains(&number) {
+        third
+    } else {
+        0.0
     }
 }
 

@@ -1,0 +1,160 @@
+//! Hypotheses in their best form: refined, in other forms of their effects, fitted to the end.
+
+use super::evidence::is_unsound;
+use super::naming::{LEAST_EXPLAINED, LEAST_EXPLAINED_EXACTLY};
+use super::{Judged, Search, carried_on, is_possible, possible, sorted};
+use crate::diagnosis::candidates::{Fitted, Part, Refined, Slopes};
+use crate::diagnosis::residuals::Scope;
+use rayon::prelude::*;
+
+/// Share of the error that a hypothesis must explain to be refined as a possible rival of the best.
+const MAY_RIVAL: f64 = 0.8;
+/// Hypotheses that may become rivals: of those that explain enough, so many by their odds and so many by what they explain.
+const MAY_BE_RIVALS: usize = 5;
+
+impl Search<'_, '_> {
+    /// The same, refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
+    /// best and the best that is possible with all of their effects, those that are carried on or may rival it with their last. Where the best leaves no more
+    /// than forms may, only its possible rivals are, with all of theirs; other forms are worth the time to single effects, also where the
+    /// best explains enough to be the only cause.
+    pub(super) fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
+        let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
+        // What cannot be leads nothing, however good.
+        let leads = judged.iter().position(is_possible);
+        let mut others = judged.into_iter().enumerate();
+        let Some(best) = others.next().map(|(_, best)| self.in_best_form(best)) else { return Vec::new() };
+        let may_be_form = self.may_be_form(&best.fitted.losses);
+        let explains = best.explained > LEAST_EXPLAINED.0;
+        let is_close = |(rank, _): &(usize, Judged)| {
+            rivals.contains(rank) || !may_be_form && ranks.contains(rank) || leads == Some(*rank)
+        };
+        let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
+        let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
+        let refined = close.into_par_iter().map(|(rank, judged)| match judged.fitted.hypothesis.parts.len() {
+            1 if may_be_form || explains => self.in_best_form(judged),
+            _ if leads == Some(rank) => self.in_best_form(judged),
+            _ if may_be_form => self.finished_refined(judged, |judged| self.refined(judged)),
+            parts => self.finished_refined(judged, |judged| self.part_refined(judged, parts - 1)),
+        });
+        sorted(refined.chain([best]).chain(rest).collect())
+    }
+
+    pub(super) fn finished(&self, judged: Judged) -> Judged {
+        let start = self.bench.scanned(&judged.fitted);
+        self.bench
+            .exact_fit(&judged.fitted.hypothesis, &start, Scope::All)
+            .map_or(judged.clone(), |fitted| self.judge(fitted))
+    }
+
+    /// A hypothesis refined and fitted to the end; as it is where its refinements would end where its causes cannot be.
+    pub(super) fn finished_refined(&self, judged: Judged, refine: impl Fn(Judged) -> Judged) -> Judged {
+        let refined = self.finished(refine(judged.clone()));
+        if is_possible(&refined) || !is_possible(&judged) { refined } else { self.finished(judged) }
+    }
+
+    /// A hypothesis refined in all its effects and, where something is left then, further refined, and with one of them in another form.
+    pub(super) fn in_best_form(&self, judged: Judged) -> Judged {
+        let refined = self.finished_refined(judged.clone(), |judged| self.refined(judged));
+        if !is_unsound(&refined.fitted.losses, &self.bench.data) {
+            return refined;
+        }
+        let partly = refined
+            .fitted
+            .hypothesis
+            .parts
+            .iter()
+            .any(|part| ![Refined::NOT, self.bench.fully(part.effect)].contains(&part.refined));
+        let further = partly.then(|| self.finished_refined(refined.clone(), |judged| self.refined(judged)));
+        let other = self.in_other_forms(&judged).map(|other| self.finished_refined(other, |other| self.refined(other)));
+        let all = further.into_iter().chain(other).filter(|fit| is_possible(fit) || !is_possible(&refined));
+        all.chain([refined.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
+    }
+
+    /// The hypothesis with one of its effects in another form, the best of these: of the starts only the most promising were fitted.
+    pub(super) fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
+        let parts = &judged.fitted.hypothesis.parts;
+        let others = parts.iter().flat_map(|own| {
+            self.bench.forms(own.effect).filter(|part| part.form != own.form).map(move |part| (*own, part))
+        });
+        let fits = others.collect::<Vec<_>>().into_par_iter().filter_map(|(own, part)| {
+            let start = self.bench.best_start(&judged.fitted.parameters, own, part)?;
+            let fitted = self.bench.rough_fit(&judged.fitted.hypothesis.in_form_of(part), &start)?;
+            (!self.may_be_driven(&fitted, part)).then(|| self.judge(fitted))
+        });
+        fits.max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+
+    /// Whether what an effect does in a rare form may as well come from what drives the muscle.
+    pub(super) fn may_be_driven(&self, fitted: &Fitted, part: Part) -> bool {
+        let effects = &fitted.parameters.effects;
+        part.is_rare() && self.bench.data.goes_with_inputs(|time| effects.own_course(part.effect.name, time))
+    }
+
+    /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
+    /// for them. What hid refinements of an earlier effect may have been the last one. A rare form with refinements would fit
+    /// whatever is slow, and has none.
+    pub(super) fn refined(&self, judged: Judged) -> Judged {
+        let parts = (0..judged.fitted.hypothesis.parts.len()).rev();
+        parts.fold(judged, |judged, which| self.part_refined(judged, which))
+    }
+
+    pub(super) fn part_refined(&self, judged: Judged, which: usize) -> Judged {
+        let part = judged.fitted.hypothesis.parts[which];
+        if part.is_rare() {
+            return judged;
+        }
+        let fully = self.bench.fully(part.effect);
+        let mut ways: Vec<_> = if part.refined == Refined::NOT {
+            [Refined::NOT, fully].into_iter().chain(fully.each()).collect()
+        } else if part.refined == fully {
+            return judged;
+        } else {
+            vec![fully]
+        };
+        ways.dedup(); // where there is one refinement, or none
+        // What hangs on details hangs on what the corrections do here, too.
+        let slopes = self.bench.slopes_of(&judged.fitted);
+        let better = ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes));
+        // A refinement that ends where the cause cannot be says nothing of the cause.
+        let better = better.filter(|better| is_possible(better) || !is_possible(&judged));
+        better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
+    }
+
+    pub(super) fn refined_by(
+        &self,
+        judged: &Judged,
+        which: usize,
+        refined: Refined,
+        slopes: &Slopes,
+    ) -> Option<Judged> {
+        let mut hypothesis = judged.fitted.hypothesis.clone();
+        let part = &mut hypothesis.parts[which];
+        let known: Vec<&str> = part.freed().map(|(name, _)| *name).collect();
+        part.refined = refined;
+        let part = *part;
+        let start = self.bench.refined_start(&judged.fitted.parameters, part, &known)?;
+        Some(self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &start)?))
+    }
+
+    /// Hypotheses of several effects, those in their best form that a form may keep from rivalling the best.
+    pub(super) fn rivals_in_best_form(&self, level: Vec<Judged>) -> Vec<Judged> {
+        let best = possible(&level).filter(|best| self.may_be_form(&best.fitted.losses));
+        let Some(best) = best.map(|best| best.fitted.hypothesis.names()) else { return level };
+        let lacks_form =
+            |judged: &Judged| judged.explained > LEAST_EXPLAINED_EXACTLY.0 && judged.fitted.hypothesis.names() != best;
+        let (mut close, mut rest): (Vec<_>, Vec<_>) = level.into_iter().partition(lacks_form);
+        rest.extend(close.split_off(close.len().min(MAY_BE_RIVALS)));
+        let close = close.into_par_iter().map(|judged| self.in_best_form(judged));
+        sorted(close.chain(rest).collect())
+    }
+}
+
+/// Ranks of the hypotheses that may rival the best: of those that explain enough the best, and those that explain
+/// the most, since in one signal a form that is not quite right spoils the odds.
+fn may_rival(level: &[Judged]) -> Vec<usize> {
+    let mut ranks: Vec<usize> = (0..level.len()).filter(|rank| level[*rank].explained > MAY_RIVAL).collect();
+    let best: Vec<usize> = ranks.iter().copied().filter(|rank| *rank < MAY_BE_RIVALS).collect();
+    ranks.sort_by(|a, b| level[*b].explained.total_cmp(&level[*a].explained));
+    ranks.truncate(MAY_BE_RIVALS);
+    best.into_iter().chain(ranks).collect()
+}

@@ -1,0 +1,395 @@
+//! Which causes are named, if any: forward selection over a beam of hypotheses, with refusal in both directions.
+
+pub mod evidence;
+mod forms;
+mod naming;
+
+use super::Verdict;
+use super::candidates::{Bench, Fitted, Part, Start, has_many_minima, neutralised};
+use super::residuals::{Data, Loss, Scope};
+use crate::effects::Effects;
+use crate::measurement::Signal;
+use evidence::*;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Evidence (natural logarithm of odds) that an effect must have: e¹⁰, about 22 000 to 1.
+pub const LEAST_EVIDENCE: f64 = 10.0;
+/// Share of what is left that a further effect must explain: less is how the first one's form differs from the true one.
+const LEAST_FURTHER: f64 = 0.8;
+/// The same of what is little enough to be the first one's form: a cause of its own leaves next to nothing of it.
+const LEAST_OF_FORM: f64 = 0.9;
+/// The same before the hypothesis is refined: fits of two effects that came to be named began at 0.87 and more.
+const MAY_GO_FURTHER: f64 = 0.5;
+/// Variance, relative to that of the noise, that an effect must take off where what is left without it may be the form of another one, or
+/// coefficients that are off: what is less than the noise itself says nothing of a cause.
+const LEAST_BESIDE_OTHERS: f64 = 1.0;
+/// How many times the structural error of a sound model, or that share of the span where it has none, an error must be to be
+/// called unexplained.
+const UNEXPLAINED: f64 = 9.75;
+/// Share of the largest reading by which a good sensor may drift, class 0.2: no reason to call a model wrong.
+const SENSOR_CLASS: f64 = 0.002;
+/// Hypotheses that are carried on at each number of effects, besides those that are best for a signal.
+const BEAM: usize = 3;
+/// Most effects that are looked for at once.
+pub const MOST_EFFECTS: usize = 3;
+/// Candidates that are fitted, of those that look promising: for the first effect, and for further ones; and the share of the
+/// best one's promise from which on up to twice as many are, since then the promise does not tell which.
+const FITTED: (usize, usize) = (9, 5);
+const AS_PROMISING: f64 = 0.98;
+/// Starts from which a candidate is fitted, and the share of the first one's promise that a further one must have.
+const STARTS: usize = 2;
+const ALSO_PROMISING: f64 = 0.5;
+/// Share of the squares in which starts of a form differ that are not the same one scaled.
+const SAME_PROMISE: f64 = 1e-4;
+
+/// A hypothesis with what speaks for it.
+#[derive(Clone)]
+pub struct Judged {
+    /// The fit.
+    pub fitted: Fitted,
+    /// Evidence against the baseline.
+    pub evidence: f64,
+    /// Logarithm of its odds if nothing but noise were left, up to a constant: by this hypotheses are ranked.
+    score: f64,
+    /// Share of the error beyond noise that is explained.
+    pub explained: f64,
+}
+
+/// The outcome of a search.
+pub struct Chosen {
+    /// What is said.
+    pub verdict: Verdict,
+    /// The hypothesis whose effects are named, fitted to the samples that fits may see; that of the baseline where none is.
+    pub model: Fitted,
+    /// Whether that fit saw all samples, since the first ones tell too little.
+    pub saw_all: bool,
+    /// The best fit to all samples; that of the baseline where no cause is named.
+    pub best: Fitted,
+    /// What the baseline leaves.
+    without: Vec<Loss>,
+    /// Per effect of the model, in its order: effects that could stand in its place.
+    pub alternatives: Vec<Vec<&'static str>>,
+    /// The hypotheses with these effects in their place.
+    pub rivals: Vec<Fitted>,
+    /// Single effects, the best first.
+    pub singles: Vec<Judged>,
+}
+
+impl Chosen {
+    /// Whether any cause is named.
+    pub fn names_causes(&self) -> bool {
+        !self.model.hypothesis.parts.is_empty()
+    }
+
+    /// Whether the best fit to all samples leaves no more than a sound model may.
+    pub fn leaves_nothing(&self, data: &Data) -> bool {
+        !is_unsound(&self.best.losses, data)
+    }
+
+    /// Whether the causes take off so much that coefficients that are each off by themselves need not be what they stand for.
+    pub fn shows_beside_coefficients(&self, data: &Data) -> bool {
+        takes_off(&self.without, &self.best.losses, |signal| data.structure(signal).max(LEAST_BESIDE_OTHERS))
+    }
+}
+
+/// The search for the causes of what a baseline leaves.
+pub struct Search<'a, 'b> {
+    bench: &'b mut Bench<'a>,
+    baseline: Fitted,
+    /// Most effects that are looked for at once.
+    most: usize,
+}
+
+impl<'a, 'b> Search<'a, 'b> {
+    /// A search from a baseline for at most so many effects.
+    pub fn new(bench: &'b mut Bench<'a>, baseline: Fitted, most: usize) -> Self {
+        Self { bench, baseline, most }
+    }
+
+    fn judge(&self, fitted: Fitted) -> Judged {
+        let evidence = evidence(&self.baseline, &fitted);
+        let explained = explained(&self.baseline.losses, &fitted.losses, &self.bench.data);
+        let score = self.bench.data.log_likelihood(&fitted.losses)
+            - 0.5 * fitted.hypothesis.size() as f64 * (fitted.residuals.len() as f64).ln();
+        Judged { fitted, evidence, score, explained }
+    }
+
+    /// Finds the causes; `done` is told after each candidate.
+    pub fn run(mut self, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
+        let starts = self.starts(done);
+        let from = best_of_each(&starts);
+        let mut singles = self.fitted(&self.baseline, starts, FITTED.0);
+        if singles.first().is_some_and(|best| best.evidence > LEAST_EVIDENCE) {
+            singles = self.judged_anew(singles);
+        }
+        let singles = if self.may_show() { self.refined_best(singles) } else { singles };
+        self.go_on(vec![singles.clone()], singles, &from)
+    }
+
+    /// Adds levels of one effect more each while that is worth it, and chooses.
+    fn go_on(&self, mut levels: Vec<Vec<Judged>>, singles: Vec<Judged>, from: &[(Part, usize)]) -> Option<Chosen> {
+        while self.is_worth_going_on(&levels) {
+            let next = self.next_level(levels.last()?, from);
+            levels.push(next);
+        }
+        self.choose(&levels, singles)
+    }
+
+    /// Judges fits again with what the first of them shows of the noise.
+    fn judged_anew(&mut self, fits: Vec<Judged>) -> Vec<Judged> {
+        let Some(first) = fits.first() else { return fits };
+        self.bench.refine_noise(&first.fitted.residuals);
+        let anew = |mut fitted: Fitted| {
+            fitted.losses = self.bench.data.losses(&fitted.residuals, Scope::All);
+            fitted
+        };
+        let baseline = anew(self.baseline.clone());
+        let fits: Vec<Fitted> = fits.into_iter().map(|judged| anew(judged.fitted)).collect();
+        self.baseline = baseline;
+        sorted(fits.into_iter().map(|fitted| self.judge(fitted)).collect())
+    }
+
+    /// Where fits of single effects start, the most promising of each first.
+    fn starts(&self, done: &(dyn Fn(&str) + Sync)) -> Vec<Vec<Start>> {
+        let starts = Effects::DESCRIPTIONS.par_iter().map(|effect| {
+            let starts = self.bench.starts(&self.baseline, effect);
+            done(effect.name);
+            starts
+        });
+        starts.filter(|starts| !starts.is_empty()).collect()
+    }
+
+    /// The most promising hypotheses with one effect more, the best first. The base that leads is worth a look at every start;
+    /// the others are extended from where each effect alone is best fitted, but for those whose error has many minima.
+    fn extend(&self, base: &Fitted, leads: bool, from: &[(Part, usize)]) -> Vec<Judged> {
+        let others = from.par_iter().filter(|(part, _)| !base.hypothesis.has(part.effect.name));
+        let starts = others.map(|(part, choice)| {
+            if leads || has_many_minima(part.effect) {
+                self.bench.starts(base, part.effect)
+            } else {
+                self.bench.start(base, *part, *choice).into_iter().collect()
+            }
+        });
+        self.fitted(base, starts.filter(|starts| !starts.is_empty()).collect(), FITTED.1)
+    }
+
+    /// Fits of the most promising effects, each from its most promising starts, the best first.
+    fn fitted(&self, base: &Fitted, mut starts: Vec<Vec<Start>>, most: usize) -> Vec<Judged> {
+        starts.sort_by(|a, b| b[0].promise.total_cmp(&a[0].promise));
+        let as_good = AS_PROMISING * starts.first().map_or(0.0, |best| best[0].promise);
+        let equal = starts.iter().take_while(|starts| starts[0].promise >= as_good).count();
+        starts.truncate(equal.clamp(most, 2 * most));
+        let best = |starts: Vec<Start>| {
+            let also = ALSO_PROMISING * starts[0].promise;
+            let fits = distinct(&starts).take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
+                Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &start.parameters)?))
+            });
+            fits.max_by(|a, b| a.score.total_cmp(&b.score))
+        };
+        sorted(starts.into_par_iter().filter_map(best).collect())
+    }
+
+    /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect; or whether no single
+    /// effect has the odds for it, as each of two leaves the other one's error. What the form of one cause may leave is worth a second one;
+    /// what the forms of two may leave is not worth a third.
+    fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
+        let now = levels.last().map_or(0, |level| effects_of(level));
+        let asks_for_more = |best: &Judged| {
+            is_unsound(&best.fitted.losses, &self.bench.data) && (now == 1 || !self.may_be_form(&best.fitted.losses))
+        };
+        let is_worth = match self.leading(levels) {
+            Some(best) => best.fitted.hypothesis.parts.len() == now && asks_for_more(best),
+            None => now == 1,
+        };
+        now < self.most && is_worth && !self.is_sound(&self.baseline.losses)
+    }
+
+    /// Whether residuals are small enough to be those of forms, which are never known exactly.
+    fn may_be_form(&self, losses: &[Loss]) -> bool {
+        let before = beyond_noise(&self.baseline.losses);
+        leaves_at_most(losses, |signal| left_by_form(before[&signal]))
+    }
+
+    /// Share of what a hypothesis leaves that another one explains, in the signals in which it leaves more than forms may; where
+    /// it leaves no more than that anywhere, in those in which it leaves more than a sound model may.
+    fn further(&self, fewer: &Judged, more: &Judged) -> f64 {
+        let [before, left, after] =
+            [&self.baseline, &fewer.fitted, &more.fitted].map(|fitted| beyond_noise(&fitted.losses));
+        let (mut worth, mut still) = (0.0, 0.0);
+        let is_form_alone = self.may_be_form(&fewer.fitted.losses);
+        for (signal, left) in left {
+            let of_structure = left_by_structure(signal, &self.bench.data);
+            let least = if is_form_alone { of_structure } else { left_by_form(before[&signal]) };
+            if left > least {
+                // What a sound model may leave is not there to be explained.
+                worth += (left - of_structure).max(0.0);
+                still += (after[&signal] - of_structure).max(0.0);
+            } else {
+                still += (after[&signal] - left).max(0.0);
+            }
+        }
+        if worth > 0.0 { 1.0 - still / worth } else { 0.0 }
+    }
+
+    /// The most promising hypotheses with one effect more than those of a level, the best first.
+    ///
+    /// Of the best, effects are exchanged for others. Where it leaves more than forms may, the earlier ones are, beside what the rest
+    /// is without them: alone, a wrong one may have looked better. Where it does not, and is worth one effect more, all are, beside
+    /// what the rest is with them: what does the same there may not have been found from elsewhere.
+    fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
+        let mut bases = carried_on(level);
+        // What forms may leave is looked into only where the best leaves it.
+        if level.first().is_some_and(|best| self.may_be_form(&best.fitted.losses)) {
+            bases.truncate(1);
+        }
+        let more = bases.into_iter().flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, starts)).collect();
+        let mut next = self.worth_refining(level, more);
+        let Some(best) = possible(&next).or(next.first()) else { return next };
+        let parts = &best.fitted.hypothesis.parts;
+        let without: Vec<(&Part, Fitted)> = if !self.may_be_form(&best.fitted.losses) {
+            let earlier = parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
+            earlier.iter().filter_map(|part| Some((part, self.without(best, part)?.fitted))).collect()
+        } else if possible(level).is_some_and(|fewer| self.is_worth(fewer, best)) {
+            parts.iter().filter_map(|part| Some((part, self.bench.neutralised(&best.fitted, part.effect)?))).collect()
+        } else {
+            Vec::new()
+        };
+        let exchange = |(part, base): &(&Part, Fitted)| {
+            let others = starts.iter().copied().filter(|(other, _)| other.effect.name != part.effect.name);
+            self.extend(base, false, &others.collect::<Vec<_>>())
+        };
+        let mut exchanged: Vec<Judged> = without.iter().flat_map(exchange).collect();
+        exchanged.retain(|judged| !next.iter().any(|known| same_effects(known, judged) && known.score >= judged.score));
+        next.extend(self.worth_refining(level, exchanged));
+        self.rivals_in_best_form(each_once(next))
+    }
+
+    /// Of hypotheses those that may be worth more effects than a level has, each once, refined, the best first.
+    fn worth_refining(&self, level: &[Judged], more: Vec<Judged>) -> Vec<Judged> {
+        let may_be = |judged: &Judged| possible(level).is_none_or(|fewer| self.further(fewer, judged) > MAY_GO_FURTHER);
+        self.refined_best(first_of_each(sorted(more).into_iter().filter(may_be)))
+    }
+
+    /// A hypothesis fitted without one of its effects.
+    fn without(&self, judged: &Judged, part: &Part) -> Option<Judged> {
+        let start = neutralised(&judged.fitted.parameters, part.effect);
+        let hypothesis = judged.fitted.hypothesis.without(part.effect.name);
+        Some(self.judge(self.bench.exact_fit(&hypothesis, &start, Scope::All)?))
+    }
+
+    /// Whether an error is no reason to call a model wrong, nor to look for more than one cause.
+    fn is_sound(&self, losses: &[Loss]) -> bool {
+        let data = &self.bench.data;
+        let of_sensor = |signal| data.share_of_reading(signal, SENSOR_CLASS);
+        let of_structure = |signal| UNEXPLAINED.powi(2) * data.share_of_span(signal);
+        leaves_at_most(losses, |signal| left_by_noise(signal, data) + of_structure(signal).max(of_sensor(signal)))
+    }
+
+    /// The best hypothesis of all levels, each of which must be worth its effects; the first may be of two.
+    fn leading<'l>(&self, levels: &'l [Vec<Judged>]) -> Option<&'l Judged> {
+        let leads =
+            |best: &&Judged| best.evidence > LEAST_EVIDENCE && self.shows(&self.baseline.losses, &best.fitted.losses);
+        let mut best = possible(&levels[0]).filter(leads);
+        for level in &levels[1..] {
+            let is_worth = |more: &&Judged| best.map_or_else(|| leads(more), |best| self.is_worth(best, more));
+            let Some(more) = possible(level).filter(is_worth) else { break };
+            best = Some(more);
+        }
+        best
+    }
+
+    /// Whether a hypothesis with more effects is worth them: it pays, and explains a good part of what is left without.
+    fn is_worth(&self, fewer: &Judged, more: &Judged) -> bool {
+        let is_form_alone = self.may_be_form(&fewer.fitted.losses);
+        let (share, variance) =
+            if is_form_alone { (LEAST_OF_FORM, LEAST_BESIDE_OTHERS) } else { (LEAST_FURTHER, NEGLIGIBLE) };
+        evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE
+            && self.further(fewer, more) > share
+            && self.takes_off(&fewer.fitted.losses, &more.fitted.losses, variance)
+    }
+
+    /// Whether what an effect takes off the error of some signal is more than the structural error of a sound model:
+    /// less may be that.
+    fn shows(&self, without: &[Loss], with: &[Loss]) -> bool {
+        self.takes_off(without, with, NEGLIGIBLE)
+    }
+
+    /// The same, and more than some variance, relative to that of the noise.
+    fn takes_off(&self, without: &[Loss], with: &[Loss], least: f64) -> bool {
+        takes_off(without, with, |signal| self.bench.data.structure(signal).max(least))
+    }
+
+    /// Whether an effect could show at all.
+    fn may_show(&self) -> bool {
+        !leaves_at_most(&self.baseline.losses, |signal| self.bench.data.structure(signal).max(NEGLIGIBLE))
+    }
+}
+
+/// How many effects the hypotheses of a level have; 0 where there are none.
+fn effects_of(level: &[Judged]) -> usize {
+    level.first().map_or(0, |judged| judged.fitted.hypothesis.parts.len())
+}
+
+/// The best hypothesis of each set of effects, one that is possible where there is one; the best first.
+fn each_once(judged: Vec<Judged>) -> Vec<Judged> {
+    let (possible, impossible): (Vec<_>, Vec<_>) = judged.into_iter().partition(is_possible);
+    sorted(first_of_each(sorted(possible).into_iter().chain(sorted(impossible))))
+}
+
+/// Of hypotheses with the same effects the first one.
+fn first_of_each(judged: impl Iterator<Item = Judged>) -> Vec<Judged> {
+    let mut once: Vec<Judged> = Vec::new();
+    for judged in judged {
+        if !once.iter().any(|known| same_effects(known, &judged)) {
+            once.push(judged);
+        }
+    }
+    once
+}
+
+/// Starts of an effect, those left out that promise the same in the same form: the other way round, or so much larger.
+fn distinct(starts: &[Start]) -> impl Iterator<Item = &Start> {
+    let same = |a: &Start, b: &Start| a.part.form == b.part.form && (a.promise - b.promise).abs() < SAME_PROMISE;
+    starts
+        .iter()
+        .enumerate()
+        .filter(move |(k, start)| !starts[..*k].iter().any(|known| same(known, start)))
+        .map(|(_, s)| s)
+}
+
+/// From where each effect is best fitted.
+fn best_of_each(starts: &[Vec<Start>]) -> Vec<(Part, usize)> {
+    starts.iter().map(|starts| (starts[0].part, starts[0].choice)).collect()
+}
+
+fn same_effects(a: &Judged, b: &Judged) -> bool {
+    a.fitted.hypothesis.names() == b.fitted.hypothesis.names()
+}
+
+/// Whether the effects of a hypothesis are such as they can be.
+fn is_possible(judged: &Judged) -> bool {
+    !judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters)
+}
+
+/// The best hypothesis that is possible.
+fn possible(level: &[Judged]) -> Option<&Judged> {
+    level.iter().find(|judged| is_possible(judged))
+}
+
+/// Ranks of the hypotheses that are carried on: the best, and for each signal the one that leaves least of it, since of two
+/// effects each may be alone in its signal.
+fn carried_on(level: &[Judged]) -> Vec<usize> {
+    let left: Vec<BTreeMap<Signal, f64>> = level.iter().map(|judged| beyond_noise(&judged.fitted.losses)).collect();
+    let signals = left.first().into_iter().flat_map(|left| left.keys());
+    let best_for = |signal: &Signal| (0..level.len()).min_by(|a, b| left[*a][signal].total_cmp(&left[*b][signal]));
+    let mut chosen: Vec<usize> = (0..level.len().min(BEAM)).chain(signals.filter_map(best_for)).collect();
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen
+}
+
+fn sorted(mut judged: Vec<Judged>) -> Vec<Judged> {
+    judged.sort_by(|a, b| b.score.total_cmp(&a.score));
+    judged
+}

@@ -1,0 +1,205 @@
+//! Which of the hypotheses that were found is told, if any: what can be spared is left out, what does not foretell unseen samples is
+//! refused, and what explains them as well is told beside it.
+
+use super::evidence::*;
+use super::{Chosen, Judged, Search, effects_of, is_possible, same_effects};
+use crate::diagnosis::candidates::{Fitted, declared};
+use crate::diagnosis::residuals::Scope;
+use crate::diagnosis::{FittedParameter, Verdict};
+use crate::effects::Holds;
+use crate::parameters::Parameters;
+use rayon::prelude::*;
+
+/// Share of the error beyond noise that the named causes together must explain: of all samples, and of those that the fit did
+/// not see. Measured seals leave 3.5 % in the form of friction that we have, a measured leak 5 to 10 % of what is unseen.
+pub const LEAST_EXPLAINED: (f64, f64) = (0.96, 0.9);
+/// The same where all causes are scales and zeros: these have no form that could differ from ours.
+pub const LEAST_EXPLAINED_EXACTLY: (f64, f64) = (0.995, 0.95);
+/// The same where a cause is left to chance. A pilot that sticks ends each fast move anywhere between the command and its
+/// threshold h before it: of the mean square h²/3 of that, the variance h²/12 cannot be foretold.
+pub const LEAST_EXPLAINED_BUT_FOR_CHANCE: (f64, f64) = (0.75, 0.75);
+/// Odds up to which a rival explains the data as well as the best: 20 to 1, in natural logarithm.
+pub const RIVAL: f64 = 3.0;
+/// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
+/// in the forms, which are never known exactly. Beside a single cause one in a simpler form may leave all of that.
+pub const ALSO_BY_FORM: f64 = 3.0;
+/// Logarithm of the likelihood that a parameter without meaning takes along by chance, in one of twenty cases: half of the 95 %
+/// quantile of χ² with one degree of freedom.
+pub const SPARED: f64 = 1.92;
+
+impl Search<'_, '_> {
+    pub(super) fn choose(&self, levels: &[Vec<Judged>], singles: Vec<Judged>) -> Option<Chosen> {
+        let refused = |verdict| {
+            let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
+            Some(Chosen {
+                verdict,
+                best: self.baseline.clone(),
+                without: self.baseline.losses.clone(),
+                model,
+                saw_all: false,
+                alternatives: Vec::new(),
+                rivals: Vec::new(),
+                singles: singles.clone(),
+            })
+        };
+        let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
+        let Some(best) = self.leading(levels).map(|best| self.pruned(best.clone())) else { return refused(wrong) };
+        if best.explained < least_explained(&best.fitted).0 {
+            return refused(wrong);
+        }
+        let plain = self.simplest(&best);
+        let size = plain.fitted.hypothesis.size();
+        let told = self.without_idle(plain.clone());
+        let are_idle = told.fitted.hypothesis.size() < size;
+        let foretold = self.foretelling(told).or_else(|| if are_idle { self.foretelling(plain) } else { None });
+        let Some((model, holds_out)) = foretold else { return refused(wrong) };
+        let of_as_many = levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
+        let rivals = self.rivals(&best, size, of_as_many.map_or(&[], |level| level));
+        let alternatives: Vec<Vec<&'static str>> =
+            best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
+        let verdict = if alternatives.iter().any(|a| !a.is_empty()) {
+            Verdict::Ambiguous
+        } else if self.is_sound(&best.fitted.losses) {
+            Verdict::Explained
+        } else {
+            Verdict::PartlyExplained
+        };
+        let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
+        let (best, without) = (best.fitted, self.baseline.losses.clone());
+        Some(Chosen { verdict, model, best, without, saw_all: !holds_out, alternatives, rivals, singles })
+    }
+
+    /// Drops effects that a hypothesis of several can spare and be possible, the most superfluous first.
+    pub(super) fn pruned(&self, judged: Judged) -> Judged {
+        let parts = judged.fitted.hypothesis.parts.clone();
+        if parts.len() < 2 {
+            return judged;
+        }
+        let fewer = parts.par_iter().filter_map(|part| self.without(&judged, part)).filter(is_possible);
+        match fewer.max_by(|a, b| a.score.total_cmp(&b.score)) {
+            Some(fewer) if !self.is_worth(&fewer, &judged) => self.pruned(fewer),
+            _ => judged,
+        }
+    }
+
+    /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
+    pub(super) fn simplest(&self, judged: &Judged) -> Judged {
+        if !judged.fitted.hypothesis.is_refined() {
+            return judged.clone();
+        }
+        let plain = self.bench.less_refined(&judged.fitted, |_| false);
+        let plain = plain.filter(|fitted| is_negligible(&fitted.losses)).map(|fitted| self.judge(fitted));
+        plain.unwrap_or_else(|| judged.clone())
+    }
+
+    /// The hypothesis without those refinements that may as well be neutral: by their intervals, and by what is lost without them.
+    pub(super) fn without_idle(&self, judged: Judged) -> Judged {
+        if !judged.fitted.hypothesis.is_refined() {
+            return judged;
+        }
+        let neutral = Parameters::default();
+        let (own, _) = self.bench.intervals(&judged.fitted, Scope::All);
+        let neutral = |own: &FittedParameter| declared(&neutral, own.name).1;
+        let parts = &judged.fitted.hypothesis.parts;
+        let is_refinement =
+            |own: &&FittedParameter| parts.iter().any(|part| part.refinements().any(|(name, _)| *name == own.name));
+        let may_be_neutral = |own: &&FittedParameter| (own.low..=own.high).contains(&neutral(own));
+        let mut idle: Vec<&FittedParameter> = own.iter().filter(is_refinement).filter(may_be_neutral).collect();
+        // In its interval, the ones that are nearest to neutral first.
+        let doubt =
+            |own: &FittedParameter| (own.value - neutral(own)).abs() / (own.high - own.low).max(f64::MIN_POSITIVE);
+        idle.sort_by(|a, b| doubt(a).total_cmp(&doubt(b)));
+        let ways = [&idle[..], &idle[..idle.len().min(1)]];
+        let fewer = ways.into_iter().filter(|idle| !idle.is_empty()).find_map(|idle| self.spared(&judged, idle));
+        fewer.map_or(judged, |fewer| self.without_idle(fewer))
+    }
+
+    /// The hypothesis without some of its refinements; `None` where more is lost than chance takes.
+    pub(super) fn spared(&self, judged: &Judged, idle: &[&FittedParameter]) -> Option<Judged> {
+        let is_wanted = |name: &str| idle.iter().all(|idle| idle.name != name);
+        let fewer = self.judge(self.bench.less_refined(&judged.fitted, is_wanted)?);
+        let [likelihood, without] =
+            [judged, &fewer].map(|judged| self.bench.data.log_likelihood(&judged.fitted.losses));
+        (is_possible(&fewer) && likelihood - without <= SPARED * idle.len() as f64).then_some(fewer)
+    }
+
+    /// A hypothesis fitted to the samples that fits may see, and whether it foretells the others; or, where these tell too little,
+    /// as it was fitted to all: they cannot tell it from their own best, or are foretold by a fit to the others. `None` where neither will
+    /// do.
+    pub(super) fn foretelling(&self, told: Judged) -> Option<(Fitted, bool)> {
+        let seeing = |seen| self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, seen);
+        let may_be = |fitted: &Fitted| !fitted.hypothesis.is_impossible(&fitted.parameters);
+        let foretells = |fitted: &Fitted, seen| {
+            Some(may_be(fitted) && self.holds(fitted, seen)? && !self.bench.shows_elsewhere(fitted, seen))
+        };
+        let model = seeing(Scope::Training)?;
+        if foretells(&model, Scope::Training)? {
+            return Some((model, true));
+        }
+        let tells_too_little = may_be(&model) && self.is_as_good_in_training(&told.fitted, &model)
+            || foretells(&seeing(Scope::HeldOut)?, Scope::HeldOut)?;
+        (tells_too_little && self.holds(&told.fitted, Scope::Training)?).then_some((told.fitted, false))
+    }
+
+    /// Whether the first samples cannot tell a fit from their own best.
+    ///
+    /// A pilot that sticks jumps or does not: values that no jump among the first samples tells apart make the later ones
+    /// different altogether.
+    pub(super) fn is_as_good_in_training(&self, fitted: &Fitted, trained: &Fitted) -> bool {
+        let seen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, Scope::Training);
+        !self.shows(&seen(fitted), &seen(trained))
+    }
+
+    /// Whether a fit does better than the baseline, fitted to some samples, does on all others.
+    pub(super) fn holds(&self, fitted: &Fitted, seen: Scope) -> Option<bool> {
+        let Fitted { hypothesis, parameters, .. } = &self.baseline;
+        let baseline = self.bench.exact_fit(hypothesis, parameters, seen)?;
+        let unseen = |of: &Fitted| self.bench.data.losses(&of.residuals, seen.others());
+        let (without, with) = (unseen(&baseline), unseen(fitted));
+        let explained = explained(&without, &with, &self.bench.data);
+        Some(gain(&without, &with) > 0.0 && explained > least_explained(fitted).1)
+    }
+
+    /// Hypotheses that explain the data as well as the best, which can be told with `size` parameters: all that the odds allow, or else
+    /// the one whose forms may be why it is not the best.
+    pub(super) fn rivals<'l>(&self, best: &Judged, size: usize, level: &'l [Judged]) -> Vec<&'l Judged> {
+        let possible = level.iter().filter(|other| !same_effects(other, best) && is_possible(other));
+        let (equal, behind): (Vec<_>, Vec<_>) =
+            possible.partition(|other| evidence(&other.fitted, &best.fitted) < RIVAL);
+        let by_form = || behind.into_iter().find(|other| self.differ_by_form(best, size, other));
+        if equal.is_empty() { by_form().into_iter().collect() } else { equal }
+    }
+
+    /// Whether two hypotheses leave so little that their forms decide between them, and not their causes. A cause in a simpler
+    /// form is as good as long as forms may leave as much; of several causes one would be as small as that.
+    pub(super) fn differ_by_form(&self, best: &Judged, size: usize, other: &Judged) -> bool {
+        let is_simpler = best.fitted.hypothesis.parts.len() == 1 && other.fitted.hypothesis.size() < size;
+        let [before, of_best, of_other] =
+            [&self.baseline, &best.fitted, &other.fitted].map(|fitted| beyond_noise(&fitted.losses));
+        before.into_iter().all(|(signal, before)| {
+            let alike = if is_simpler { f64::INFINITY } else { ALSO_BY_FORM * of_best[&signal] };
+            // A sound model may have its structural error, too, and then that decides.
+            let structure = self.bench.data.structure(signal).min(LEFT_BY_FORM * before);
+            of_other[&signal] <= NEGLIGIBLE.max(structure).max(alike.min(left_by_form(before)))
+        })
+    }
+}
+
+/// Share of the error that the effects of a fit must explain: of all samples, and of those that it did not see.
+fn least_explained(fitted: &Fitted) -> (f64, f64) {
+    match fitted.hypothesis.parts.iter().map(|part| part.effect.holds).max() {
+        Some(Holds::Exactly) => LEAST_EXPLAINED_EXACTLY,
+        Some(Holds::ButForChance) => LEAST_EXPLAINED_BUT_FOR_CHANCE,
+        Some(Holds::AsLaw) | None => LEAST_EXPLAINED,
+    }
+}
+
+/// Effects that stand in the place of one in rivals that agree in all others.
+fn in_place_of(effect: &str, best: &Judged, rivals: &[&Judged]) -> Vec<&'static str> {
+    let others: Vec<_> = best.fitted.hypothesis.names().into_iter().filter(|name| *name != effect).collect();
+    let agree = rivals.iter().map(|rival| rival.fitted.hypothesis.names());
+    agree
+        .filter(|names| others.iter().all(|other| names.contains(other)) && !names.contains(&effect))
+        .filter_map(|names| names.into_iter().find(|name| !others.contains(name)))
+        .collect()
+}
