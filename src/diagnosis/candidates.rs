@@ -25,9 +25,9 @@ const OF_POLYNOMIAL: [(&str, f64); 8] = [
 ];
 /// Correction of shape with its expected size in units of the tolerance: no polynomial is quite the muscle.
 const SHAPE_OF_POLYNOMIAL: [(&str, f64); 1] = [("muscle.area_bend", 0.1)];
-/// Corrections of a muscle that is off as a whole.
+/// Corrections of a muscle that is off as a whole, be it a polynomial or not.
 const AS_A_WHOLE: [(&str, f64); 2] = [("muscle.area_scale", 1.0), ("muscle.elastic_scale", 1.0)];
-/// The same as of a polynomial, whose slope is not free then.
+/// Corrections of shape of a polynomial that is off as a whole: its slope is not among the coefficients then.
 const SHAPE_AS_A_WHOLE: [(&str, f64); 2] = [("muscle.area_tilt", 0.1), ("muscle.area_bend", 0.1)];
 /// Corrections of shape of any other force, whose coefficients may all act alike or cancel each other.
 const SHAPE_OF_COURSE: [(&str, f64); 3] =

@@ -165,6 +165,9 @@ pub fn diagnose(
     let thinned = thinned(recordings);
     let mut found: Option<Found> = None;
     for off in Off::ways(nominal) {
+        if found.as_ref().is_some_and(Found::finds_nothing) {
+            break;
+        }
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;
         let mut bench = Bench::new(for_fits, nominal, tolerance, *off);
@@ -174,7 +177,8 @@ pub fn diagnose(
         if most == 0 {
             break;
         }
-        let chosen = Search::new(&mut bench, baseline, most).run(done).ok_or_else(cannot_follow)?;
+        let search = Search::new(&mut bench, baseline, most, *off == Off::most(nominal));
+        let chosen = search.run(done).ok_or_else(cannot_follow)?;
         let next = Found { bench, chosen };
         found = Some(found.filter(|found| found.beats(&next)).unwrap_or(next));
     }

@@ -15,12 +15,17 @@ pub struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where nothing is left here, fewer
-    /// causes than here, and none where coefficients alone are no better.
+    /// Whether nothing is wrong, so that nothing can be where the coefficients may be off in a way that allows more.
+    pub fn finds_nothing(&self) -> bool {
+        self.causes() == 0 && self.chosen.says_all(&self.bench.data)
+    }
+
+    /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
+    /// than here, and none where one is better than coefficients alone.
     pub fn most_beside(&self, bench: &Bench, baseline: &Fitted) -> usize {
         match self.causes() {
-            _ if !self.chosen.leaves_nothing(&self.bench.data) => MOST_EFFECTS,
-            0 => 0,
+            0 => MOST_EFFECTS,
+            _ if !self.chosen.says_all(&self.bench.data) => MOST_EFFECTS,
             1 if !self.is_better_than_coefficients(bench, baseline) => MOST_EFFECTS,
             causes => causes - 1,
         }

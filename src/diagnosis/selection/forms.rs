@@ -39,7 +39,7 @@ impl Search<'_, '_> {
         sorted(refined.chain([best]).chain(rest).collect())
     }
 
-    pub(super) fn finished(&self, judged: Judged) -> Judged {
+    fn finished(&self, judged: Judged) -> Judged {
         let start = self.bench.scanned(&judged.fitted);
         self.bench
             .exact_fit(&judged.fitted.hypothesis, &start, Scope::All)
@@ -47,13 +47,13 @@ impl Search<'_, '_> {
     }
 
     /// A hypothesis refined and fitted to the end; as it is where its refinements would end where its causes cannot be.
-    pub(super) fn finished_refined(&self, judged: Judged, refine: impl Fn(Judged) -> Judged) -> Judged {
+    fn finished_refined(&self, judged: Judged, refine: impl Fn(Judged) -> Judged) -> Judged {
         let refined = self.finished(refine(judged.clone()));
         if is_possible(&refined) || !is_possible(&judged) { refined } else { self.finished(judged) }
     }
 
     /// A hypothesis refined in all its effects and, where something is left then, further refined, and with one of them in another form.
-    pub(super) fn in_best_form(&self, judged: Judged) -> Judged {
+    fn in_best_form(&self, judged: Judged) -> Judged {
         let refined = self.finished_refined(judged.clone(), |judged| self.refined(judged));
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;
@@ -71,7 +71,7 @@ impl Search<'_, '_> {
     }
 
     /// The hypothesis with one of its effects in another form, the best of these: of the starts only the most promising were fitted.
-    pub(super) fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
+    fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
         let parts = &judged.fitted.hypothesis.parts;
         let others = parts.iter().flat_map(|own| {
             self.bench.forms(own.effect).filter(|part| part.form != own.form).map(move |part| (*own, part))
@@ -85,7 +85,7 @@ impl Search<'_, '_> {
     }
 
     /// Whether what an effect does in a rare form may as well come from what drives the muscle.
-    pub(super) fn may_be_driven(&self, fitted: &Fitted, part: Part) -> bool {
+    fn may_be_driven(&self, fitted: &Fitted, part: Part) -> bool {
         let effects = &fitted.parameters.effects;
         part.is_rare() && self.bench.data.goes_with_inputs(|time| effects.own_course(part.effect.name, time))
     }
@@ -93,12 +93,12 @@ impl Search<'_, '_> {
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay
     /// for them. What hid refinements of an earlier effect may have been the last one. A rare form with refinements would fit
     /// whatever is slow, and has none.
-    pub(super) fn refined(&self, judged: Judged) -> Judged {
+    fn refined(&self, judged: Judged) -> Judged {
         let parts = (0..judged.fitted.hypothesis.parts.len()).rev();
         parts.fold(judged, |judged, which| self.part_refined(judged, which))
     }
 
-    pub(super) fn part_refined(&self, judged: Judged, which: usize) -> Judged {
+    fn part_refined(&self, judged: Judged, which: usize) -> Judged {
         let part = judged.fitted.hypothesis.parts[which];
         if part.is_rare() {
             return judged;
@@ -120,13 +120,7 @@ impl Search<'_, '_> {
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
-    pub(super) fn refined_by(
-        &self,
-        judged: &Judged,
-        which: usize,
-        refined: Refined,
-        slopes: &Slopes,
-    ) -> Option<Judged> {
+    fn refined_by(&self, judged: &Judged, which: usize, refined: Refined, slopes: &Slopes) -> Option<Judged> {
         let mut hypothesis = judged.fitted.hypothesis.clone();
         let part = &mut hypothesis.parts[which];
         let known: Vec<&str> = part.freed().map(|(name, _)| *name).collect();

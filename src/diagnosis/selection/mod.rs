@@ -82,9 +82,12 @@ impl Chosen {
         !self.model.hypothesis.parts.is_empty()
     }
 
-    /// Whether the best fit to all samples leaves no more than a sound model may.
-    pub fn leaves_nothing(&self, data: &Data) -> bool {
-        !is_unsound(&self.best.losses, data)
+    /// Whether the best fit to all samples leaves no more than a sound model may and, of several causes, their forms.
+    pub fn says_all(&self, data: &Data) -> bool {
+        let before = beyond_noise(&self.without);
+        let has_several = self.model.hypothesis.parts.len() > 1;
+        let of_form = |signal| if has_several { left_by_form(before[&signal]) } else { 0.0 };
+        leaves_at_most(&self.best.losses, |signal| left_by_structure(signal, data).max(of_form(signal)))
     }
 
     /// Whether the causes take off so much that coefficients that are each off by themselves need not be what they stand for.
@@ -99,12 +102,15 @@ pub struct Search<'a, 'b> {
     baseline: Fitted,
     /// Most effects that are looked for at once.
     most: usize,
+    /// Whether what the form of one cause may leave is worth a second one.
+    minds_form: bool,
 }
 
 impl<'a, 'b> Search<'a, 'b> {
-    /// A search from a baseline for at most so many effects.
-    pub fn new(bench: &'b mut Bench<'a>, baseline: Fitted, most: usize) -> Self {
-        Self { bench, baseline, most }
+    /// A search from a baseline for at most so many effects. Where another search lets the coefficients be off in a way that allows more, what
+    /// the form of a cause may leave is that one's to explain: else coefficients that are off come out as a second cause.
+    pub fn new(bench: &'b mut Bench<'a>, baseline: Fitted, most: usize, minds_form: bool) -> Self {
+        Self { bench, baseline, most, minds_form }
     }
 
     fn judge(&self, fitted: Fitted) -> Judged {
@@ -196,7 +202,8 @@ impl<'a, 'b> Search<'a, 'b> {
     fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
         let now = levels.last().map_or(0, |level| effects_of(level));
         let asks_for_more = |best: &Judged| {
-            is_unsound(&best.fitted.losses, &self.bench.data) && (now == 1 || !self.may_be_form(&best.fitted.losses))
+            is_unsound(&best.fitted.losses, &self.bench.data)
+                && (now == 1 && self.minds_form || !self.may_be_form(&best.fitted.losses))
         };
         let is_worth = match self.leading(levels) {
             Some(best) => best.fitted.hypothesis.parts.len() == now && asks_for_more(best),

@@ -2,7 +2,7 @@
 //! refused, and what explains them as well is told beside it.
 
 use super::evidence::*;
-use super::{Chosen, Judged, Search, effects_of, is_possible, same_effects};
+use super::{Chosen, Judged, LEAST_EVIDENCE, Search, effects_of, is_possible, same_effects};
 use crate::diagnosis::candidates::{Fitted, declared};
 use crate::diagnosis::residuals::Scope;
 use crate::diagnosis::{FittedParameter, Verdict};
@@ -17,15 +17,15 @@ pub const LEAST_EXPLAINED: (f64, f64) = (0.96, 0.9);
 pub const LEAST_EXPLAINED_EXACTLY: (f64, f64) = (0.995, 0.95);
 /// The same where a cause is left to chance. A pilot that sticks ends each fast move anywhere between the command and its
 /// threshold h before it: of the mean square h²/3 of that, the variance h²/12 cannot be foretold.
-pub const LEAST_EXPLAINED_BUT_FOR_CHANCE: (f64, f64) = (0.75, 0.75);
+const LEAST_EXPLAINED_BUT_FOR_CHANCE: (f64, f64) = (0.75, 0.75);
 /// Odds up to which a rival explains the data as well as the best: 20 to 1, in natural logarithm.
-pub const RIVAL: f64 = 3.0;
+const RIVAL: f64 = 3.0;
 /// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
 /// in the forms, which are never known exactly. Beside a single cause one in a simpler form may leave all of that.
-pub const ALSO_BY_FORM: f64 = 3.0;
+const ALSO_BY_FORM: f64 = 3.0;
 /// Logarithm of the likelihood that a parameter without meaning takes along by chance, in one of twenty cases: half of the 95 %
 /// quantile of χ² with one degree of freedom.
-pub const SPARED: f64 = 1.92;
+const SPARED: f64 = 1.92;
 
 impl Search<'_, '_> {
     pub(super) fn choose(&self, levels: &[Vec<Judged>], singles: Vec<Judged>) -> Option<Chosen> {
@@ -44,7 +44,7 @@ impl Search<'_, '_> {
         };
         let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
         let Some(best) = self.leading(levels).map(|best| self.pruned(best.clone())) else { return refused(wrong) };
-        if best.explained < least_explained(&best.fitted).0 {
+        if best.explained < least_explained(&best.fitted).0 || is_better_if_impossible(levels, &best) {
             return refused(wrong);
         }
         let plain = self.simplest(&best);
@@ -70,7 +70,7 @@ impl Search<'_, '_> {
     }
 
     /// Drops effects that a hypothesis of several can spare and be possible, the most superfluous first.
-    pub(super) fn pruned(&self, judged: Judged) -> Judged {
+    fn pruned(&self, judged: Judged) -> Judged {
         let parts = judged.fitted.hypothesis.parts.clone();
         if parts.len() < 2 {
             return judged;
@@ -83,7 +83,7 @@ impl Search<'_, '_> {
     }
 
     /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
-    pub(super) fn simplest(&self, judged: &Judged) -> Judged {
+    fn simplest(&self, judged: &Judged) -> Judged {
         if !judged.fitted.hypothesis.is_refined() {
             return judged.clone();
         }
@@ -93,7 +93,7 @@ impl Search<'_, '_> {
     }
 
     /// The hypothesis without those refinements that may as well be neutral: by their intervals, and by what is lost without them.
-    pub(super) fn without_idle(&self, judged: Judged) -> Judged {
+    fn without_idle(&self, judged: Judged) -> Judged {
         if !judged.fitted.hypothesis.is_refined() {
             return judged;
         }
@@ -115,7 +115,7 @@ impl Search<'_, '_> {
     }
 
     /// The hypothesis without some of its refinements; `None` where more is lost than chance takes.
-    pub(super) fn spared(&self, judged: &Judged, idle: &[&FittedParameter]) -> Option<Judged> {
+    fn spared(&self, judged: &Judged, idle: &[&FittedParameter]) -> Option<Judged> {
         let is_wanted = |name: &str| idle.iter().all(|idle| idle.name != name);
         let fewer = self.judge(self.bench.less_refined(&judged.fitted, is_wanted)?);
         let [likelihood, without] =
@@ -126,7 +126,7 @@ impl Search<'_, '_> {
     /// A hypothesis fitted to the samples that fits may see, and whether it foretells the others; or, where these tell too little,
     /// as it was fitted to all: they cannot tell it from their own best, or are foretold by a fit to the others. `None` where neither will
     /// do.
-    pub(super) fn foretelling(&self, told: Judged) -> Option<(Fitted, bool)> {
+    fn foretelling(&self, told: Judged) -> Option<(Fitted, bool)> {
         let seeing = |seen| self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, seen);
         let may_be = |fitted: &Fitted| !fitted.hypothesis.is_impossible(&fitted.parameters);
         let foretells = |fitted: &Fitted, seen| {
@@ -145,13 +145,13 @@ impl Search<'_, '_> {
     ///
     /// A pilot that sticks jumps or does not: values that no jump among the first samples tells apart make the later ones
     /// different altogether.
-    pub(super) fn is_as_good_in_training(&self, fitted: &Fitted, trained: &Fitted) -> bool {
+    fn is_as_good_in_training(&self, fitted: &Fitted, trained: &Fitted) -> bool {
         let seen = |fitted: &Fitted| self.bench.data.losses(&fitted.residuals, Scope::Training);
         !self.shows(&seen(fitted), &seen(trained))
     }
 
     /// Whether a fit does better than the baseline, fitted to some samples, does on all others.
-    pub(super) fn holds(&self, fitted: &Fitted, seen: Scope) -> Option<bool> {
+    fn holds(&self, fitted: &Fitted, seen: Scope) -> Option<bool> {
         let Fitted { hypothesis, parameters, .. } = &self.baseline;
         let baseline = self.bench.exact_fit(hypothesis, parameters, seen)?;
         let unseen = |of: &Fitted| self.bench.data.losses(&of.residuals, seen.others());
@@ -162,7 +162,7 @@ impl Search<'_, '_> {
 
     /// Hypotheses that explain the data as well as the best, which can be told with `size` parameters: all that the odds allow, or else
     /// the one whose forms may be why it is not the best.
-    pub(super) fn rivals<'l>(&self, best: &Judged, size: usize, level: &'l [Judged]) -> Vec<&'l Judged> {
+    fn rivals<'l>(&self, best: &Judged, size: usize, level: &'l [Judged]) -> Vec<&'l Judged> {
         let possible = level.iter().filter(|other| !same_effects(other, best) && is_possible(other));
         let (equal, behind): (Vec<_>, Vec<_>) =
             possible.partition(|other| evidence(&other.fitted, &best.fitted) < RIVAL);
@@ -172,7 +172,7 @@ impl Search<'_, '_> {
 
     /// Whether two hypotheses leave so little that their forms decide between them, and not their causes. A cause in a simpler
     /// form is as good as long as forms may leave as much; of several causes one would be as small as that.
-    pub(super) fn differ_by_form(&self, best: &Judged, size: usize, other: &Judged) -> bool {
+    fn differ_by_form(&self, best: &Judged, size: usize, other: &Judged) -> bool {
         let is_simpler = best.fitted.hypothesis.parts.len() == 1 && other.fitted.hypothesis.size() < size;
         let [before, of_best, of_other] =
             [&self.baseline, &best.fitted, &other.fitted].map(|fitted| beyond_noise(&fitted.losses));
@@ -192,6 +192,12 @@ fn least_explained(fitted: &Fitted) -> (f64, f64) {
         Some(Holds::ButForChance) => LEAST_EXPLAINED_BUT_FOR_CHANCE,
         Some(Holds::AsLaw) | None => LEAST_EXPLAINED,
     }
+}
+
+/// Whether the same effects explain much more where they are such as they cannot be: then the possible fit is a makeshift.
+fn is_better_if_impossible(levels: &[Vec<Judged>], best: &Judged) -> bool {
+    let mut same = levels.iter().flatten().filter(|other| same_effects(other, best) && !is_possible(other));
+    same.any(|other| evidence(&best.fitted, &other.fitted) > LEAST_EVIDENCE)
 }
 
 /// Effects that stand in the place of one in rivals that agree in all others.
