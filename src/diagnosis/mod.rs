@@ -173,10 +173,7 @@ pub fn diagnose(
         let mut bench = Bench::new(for_fits, nominal, tolerance, *off);
         let baseline = baseline(&mut bench).ok_or_else(cannot_follow)?;
         done("nominal");
-        let most = found.as_ref().map_or(MOST_EFFECTS, |found| found.most_beside(&bench, &baseline));
-        if most == 0 {
-            break;
-        }
+        let most = found.as_ref().map_or(MOST_EFFECTS, Found::most_beside);
         let search = Search::new(&mut bench, baseline, most, *off == Off::most(nominal));
         let chosen = search.run(done).ok_or_else(cannot_follow)?;
         let next = Found { bench, chosen };

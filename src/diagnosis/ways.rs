@@ -21,13 +21,12 @@ impl Found<'_> {
     }
 
     /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
-    /// than here, and none where one is better than coefficients alone.
-    pub fn most_beside(&self, bench: &Bench, baseline: &Fitted) -> usize {
+    /// than here, but a single one that may be another.
+    pub fn most_beside(&self) -> usize {
         match self.causes() {
             0 => MOST_EFFECTS,
             _ if !self.chosen.says_all(&self.bench.data) => MOST_EFFECTS,
-            1 if !self.is_better_than_coefficients(bench, baseline) => MOST_EFFECTS,
-            causes => causes - 1,
+            causes => (causes - 1).max(1),
         }
     }
 
