@@ -2,8 +2,8 @@
 //! that are each off by themselves can stand for many. Bayes' rule weighs both.
 
 use super::candidates::{Bench, Fitted};
-use super::residuals::{Loss, Scope};
-use super::selection::evidence::gain;
+use super::residuals::Scope;
+use super::selection::evidence::odds;
 use super::selection::{Chosen, LEAST_EVIDENCE, MOST_EFFECTS};
 
 /// What was found where the coefficients of the nominal model may be off in one way.
@@ -31,42 +31,27 @@ impl Found<'_> {
     }
 
     /// Whether causes are named here that are better than what was found where the coefficients may be off in a way that allows more. Each
-    /// cause more must be worth it.
+    /// cause more must be worth it, and against coefficients alone they must show.
     pub fn beats(&self, other: &Self) -> bool {
         let more = self.causes() as f64 - other.causes() as f64;
-        match (self.causes(), other.causes()) {
-            (0, _) => false,
-            (_, 0) => self.is_better_than_coefficients(&other.bench, &other.chosen.best),
-            _ => self.odds_against(&other.bench, &other.chosen.best) > LEAST_EVIDENCE * more,
-        }
-    }
-
-    /// Whether the causes are better than coefficients that are each off by themselves.
-    fn is_better_than_coefficients(&self, bench: &Bench, baseline: &Fitted) -> bool {
-        self.chosen.shows_beside_coefficients(&self.bench.data)
-            && self.odds_against(bench, baseline) > LEAST_EVIDENCE * self.causes() as f64
+        let may_be = other.causes() > 0 || self.chosen.shows_beside_coefficients(&self.bench.data);
+        self.causes() > 0 && may_be && self.odds_against(other) > LEAST_EVIDENCE * more
     }
 
     fn causes(&self) -> usize {
         self.chosen.model.hypothesis.parts.len()
     }
 
-    fn odds_against(&self, bench: &Bench, fitted: &Fitted) -> f64 {
-        odds_between_ways(&self.bench, &self.chosen.best, (bench, fitted))
+    /// Logarithm of the odds for the best fit here against the other one; the likelihoods are those of the other one's data.
+    fn odds_against(&self, other: &Self) -> f64 {
+        let [own, others] = [&self.chosen.best, &other.chosen.best];
+        let losses = |fitted: &Fitted| other.bench.data.losses(&fitted.residuals, Scope::All);
+        let (mut with, without) = (losses(own), losses(others));
+        // The whiter residuals say how much a sample is worth.
+        for (a, b) in with.iter_mut().zip(&without) {
+            a.effective = a.effective.max(b.effective);
+        }
+        let more = own.hypothesis.size() as f64 - others.hypothesis.size() as f64;
+        odds(&without, &with, more) - self.bench.price(own) + other.bench.price(others)
     }
-}
-
-/// Logarithm of the odds for a fit against another one that lets the coefficients of the nominal model be off in another way; the
-/// likelihoods are those of the other one's data.
-fn odds_between_ways(bench: &Bench, fitted: &Fitted, other: (&Bench, &Fitted)) -> f64 {
-    let [own, others] = [fitted, other.1].map(|fitted| other.0.data.losses(&fitted.residuals, Scope::All));
-    // The whiter residuals say how much a sample is worth.
-    let effective: Vec<f64> = own.iter().zip(&others).map(|(a, b)| a.effective.max(b.effective)).collect();
-    let as_whitest = |losses: Vec<Loss>| -> Vec<Loss> {
-        losses.into_iter().zip(&effective).map(|(loss, effective)| Loss { effective: *effective, ..loss }).collect()
-    };
-    let more = fitted.hypothesis.size() as f64 - other.1.hypothesis.size() as f64;
-    let samples: f64 = effective.iter().sum();
-    gain(&as_whitest(others), &as_whitest(own)) - 0.5 * more * samples.max(2.0).ln() - bench.price(fitted)
-        + other.0.price(other.1)
 }

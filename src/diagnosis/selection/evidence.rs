@@ -10,7 +10,7 @@ pub const NEGLIGIBLE: f64 = 0.25;
 /// Share of a signal's error that a named effect may leave because its form differs from the true one: a tenth of its rms.
 pub const LEFT_BY_FORM: f64 = 0.01;
 /// How many standard deviations of the noise's variance a sound model may leave: 0.1 % of all estimates are off by more.
-pub const NOISE_DOUBT: f64 = 3.0;
+const NOISE_DOUBT: f64 = 3.0;
 
 /// Logarithm of the odds for a hypothesis against another: gain of likelihood per signal and recording at the effective
 /// number of samples, less what its parameters cost (G. Schwarz 1978, doi 10.1214/aos/1176344136).
@@ -18,9 +18,13 @@ pub const NOISE_DOUBT: f64 = 3.0;
 /// The size of the residuals of each signal is taken as unknown, so that the ratio counts; the structural error that a sound
 /// model may have is added to them, and how long they hang together is judged from the fit that the odds are for.
 pub fn evidence(without: &Fitted, with: &Fitted) -> f64 {
-    let samples: f64 = with.losses.iter().map(|loss| loss.effective).sum();
-    let more = with.hypothesis.size() as f64 - without.hypothesis.size() as f64;
-    gain(&without.losses, &with.losses) - 0.5 * more * samples.max(2.0).ln()
+    odds(&without.losses, &with.losses, with.hypothesis.size() as f64 - without.hypothesis.size() as f64)
+}
+
+/// The same of losses, for a hypothesis with so many parameters more.
+pub fn odds(without: &[Loss], with: &[Loss], more: f64) -> f64 {
+    let samples: f64 = with.iter().map(|loss| loss.effective).sum();
+    gain(without, with) - 0.5 * more * samples.max(2.0).ln()
 }
 
 /// Gain of logarithmic likelihood.
@@ -57,7 +61,7 @@ pub fn left_by_noise(signal: Signal, data: &Data) -> f64 {
 }
 
 /// What is left beyond that.
-pub fn unsound(left: &BTreeMap<Signal, f64>, data: &Data) -> f64 {
+fn unsound(left: &BTreeMap<Signal, f64>, data: &Data) -> f64 {
     left.iter().map(|(signal, left)| (left - left_by_structure(*signal, data)).max(0.0)).sum()
 }
 
@@ -77,10 +81,10 @@ pub fn explained(without: &[Loss], with: &[Loss], data: &Data) -> f64 {
     1.0 - unsound(&beyond_noise(with), data) / before.max(f64::MIN_POSITIVE)
 }
 
-/// Whether more goes away of some signal than the least.
-pub fn takes_off(without: &[Loss], with: &[Loss], least: impl Fn(Signal) -> f64) -> bool {
+/// Whether more goes away of some signal than the structural error of a sound model, and than some variance, relative to that of the noise.
+pub fn takes_off(without: &[Loss], with: &[Loss], data: &Data, least: f64) -> bool {
     let (before, after) = (beyond_noise(without), beyond_noise(with));
-    before.into_iter().any(|(signal, beyond)| beyond - after[&signal] > least(signal))
+    before.into_iter().any(|(signal, beyond)| beyond - after[&signal] > data.structure(signal).max(least))
 }
 
 /// Whether nothing beyond noise is left that is worth a look.

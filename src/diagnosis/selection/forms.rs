@@ -13,7 +13,7 @@ const MAY_RIVAL: f64 = 0.8;
 const MAY_BE_RIVALS: usize = 5;
 
 impl Search<'_, '_> {
-    /// The same, refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
+    /// Hypotheses refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
     /// best and the best that is possible with all of their effects, those that are carried on or may rival it with their last. Where the best leaves no more
     /// than forms may, only its possible rivals are, with all of theirs; other forms are worth the time to single effects, also where the
     /// best explains enough to be the only cause.

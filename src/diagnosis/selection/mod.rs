@@ -92,7 +92,7 @@ impl Chosen {
 
     /// Whether the causes take off so much that coefficients that are each off by themselves need not be what they stand for.
     pub fn shows_beside_coefficients(&self, data: &Data) -> bool {
-        takes_off(&self.without, &self.best.losses, |signal| data.structure(signal).max(LEAST_BESIDE_OTHERS))
+        takes_off(&self.without, &self.best.losses, data, LEAST_BESIDE_OTHERS)
     }
 }
 
@@ -313,18 +313,13 @@ impl<'a, 'b> Search<'a, 'b> {
             if is_form_alone { (LEAST_OF_FORM, LEAST_BESIDE_OTHERS) } else { (LEAST_FURTHER, NEGLIGIBLE) };
         evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE
             && self.further(fewer, more) > share
-            && self.takes_off(&fewer.fitted.losses, &more.fitted.losses, variance)
+            && takes_off(&fewer.fitted.losses, &more.fitted.losses, &self.bench.data, variance)
     }
 
     /// Whether what an effect takes off the error of some signal is more than the structural error of a sound model:
     /// less may be that.
     fn shows(&self, without: &[Loss], with: &[Loss]) -> bool {
-        self.takes_off(without, with, NEGLIGIBLE)
-    }
-
-    /// The same, and more than some variance, relative to that of the noise.
-    fn takes_off(&self, without: &[Loss], with: &[Loss], least: f64) -> bool {
-        takes_off(without, with, |signal| self.bench.data.structure(signal).max(least))
+        takes_off(without, with, &self.bench.data, NEGLIGIBLE)
     }
 
     /// Whether an effect could show at all.
