@@ -104,20 +104,38 @@ impl Search<'_, '_> {
             return judged;
         }
         let fully = self.bench.fully(part.effect);
-        let mut ways: Vec<_> = if part.refined == Refined::NOT {
-            [Refined::NOT, fully].into_iter().chain(fully.each()).collect()
-        } else if part.refined == fully {
+        if part.refined == fully && fully != Refined::NOT {
             return judged;
-        } else {
-            vec![fully]
-        };
-        ways.dedup(); // where there is one refinement, or none
+        }
         // What hangs on details hangs on what the corrections do here, too.
         let slopes = self.bench.slopes_of(&judged.fitted);
-        let better = ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes));
+        let refined_by = |refined| self.refined_by(&judged, which, refined, &slopes);
+        let is_plain = part.refined == Refined::NOT;
+        let mut ways = vec![fully];
+        ways.extend((is_plain && fully != Refined::NOT).then_some(Refined::NOT));
+        let mut fits: Vec<Judged> = ways.into_par_iter().filter_map(refined_by).collect();
+        // Where all refinements together are not worth the price of one, none of them is.
+        if is_plain && self.may_pay(&fits) {
+            fits.extend(
+                fully
+                    .each()
+                    .filter(|one| *one != fully)
+                    .collect::<Vec<_>>()
+                    .into_par_iter()
+                    .filter_map(refined_by)
+                    .collect::<Vec<_>>(),
+            );
+        }
         // A refinement that ends where the cause cannot be says nothing of the cause.
-        let better = better.filter(|better| is_possible(better) || !is_possible(&judged));
+        let better = fits.into_iter().filter(|better| is_possible(better) || !is_possible(&judged));
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
+    }
+
+    /// Whether of fits of the same effects the first is so much more likely than the last that a parameter more may pay.
+    fn may_pay(&self, fits: &[Judged]) -> bool {
+        let [most, .., least] = fits else { return true };
+        let [with, without] = [most, least].map(|judged| self.bench.data.log_likelihood(&judged.fitted.losses));
+        with - without > 0.5 * (most.fitted.residuals.len() as f64).ln()
     }
 
     fn refined_by(&self, judged: &Judged, which: usize, refined: Refined, slopes: &Slopes) -> Option<Judged> {
