@@ -1,8 +1,8 @@
 //! Hypotheses in their best form: refined, in other forms of their effects, fitted to the end.
 
-use super::evidence::is_unsound;
+use super::evidence::{beyond_noise, is_unsound, leaves_at_most, left_by_form, left_by_structure};
 use super::naming::{LEAST_EXPLAINED, LEAST_EXPLAINED_EXACTLY};
-use super::{Judged, Search, carried_on, is_possible, possible, sorted};
+use super::{Judged, Search, carried_on, is_possible, possible, same_effects, sorted};
 use crate::diagnosis::candidates::{Fitted, Part, Refined, Slopes};
 use crate::diagnosis::residuals::Scope;
 use rayon::prelude::*;
@@ -11,6 +11,9 @@ use rayon::prelude::*;
 const MAY_RIVAL: f64 = 0.8;
 /// Hypotheses that may become rivals: of those that explain enough, so many by their odds and so many by what they explain.
 const MAY_BE_RIVALS: usize = 5;
+/// How many times what a rival may leave a fit must leave for its end not to be worth the time: of 395 ends of fits none took off more than
+/// five sixths.
+const OUT_OF_REACH: f64 = 10.0;
 
 impl Search<'_, '_> {
     /// Hypotheses refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
@@ -22,7 +25,7 @@ impl Search<'_, '_> {
         // What cannot be leads nothing, however good.
         let leads = judged.iter().position(is_possible);
         let mut others = judged.into_iter().enumerate();
-        let Some(best) = others.next().map(|(_, best)| self.in_best_form(best)) else { return Vec::new() };
+        let Some(best) = others.next().map(|(_, best)| self.in_best_form(best, None)) else { return Vec::new() };
         let may_be_form = self.may_be_form(&best.fitted.losses);
         let explains = best.explained > LEAST_EXPLAINED.0;
         let is_close = |(rank, _): &(usize, Judged)| {
@@ -31,12 +34,13 @@ impl Search<'_, '_> {
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
         let refined = close.into_par_iter().map(|(rank, judged)| match judged.fitted.hypothesis.parts.len() {
-            1 if may_be_form || explains => self.in_best_form(judged),
-            _ if leads == Some(rank) => self.in_best_form(judged),
-            _ if may_be_form => self.finished_refined(judged, |judged| self.refined(judged)),
-            parts => self.finished_refined(judged, |judged| self.part_refined(judged, parts - 1)),
+            1 if may_be_form || explains => self.in_best_form(judged, Some(&best)),
+            _ if leads == Some(rank) => self.in_best_form(judged, None),
+            _ if may_be_form => self.finished_refined(judged, Some(&best), |judged| self.refined(judged)),
+            parts => self.finished_refined(judged, None, |judged| self.part_refined(judged, parts - 1)),
         });
-        sorted(refined.chain([best]).chain(rest).collect())
+        let refined: Vec<Judged> = refined.collect();
+        sorted(refined.into_iter().chain([best]).chain(rest).collect())
     }
 
     fn finished(&self, judged: Judged) -> Judged {
@@ -46,15 +50,30 @@ impl Search<'_, '_> {
             .map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// A hypothesis refined and fitted to the end; as it is where its refinements would end where its causes cannot be.
-    fn finished_refined(&self, judged: Judged, refine: impl Fn(Judged) -> Judged) -> Judged {
-        let refined = self.finished(refine(judged.clone()));
-        if is_possible(&refined) || !is_possible(&judged) { refined } else { self.finished(judged) }
+    /// A hypothesis refined and fitted to the end, unless that brings it nowhere near the `best`; as it is where its refinements would end
+    /// where its causes cannot be.
+    fn finished_refined(&self, judged: Judged, best: Option<&Judged>, refine: impl Fn(Judged) -> Judged) -> Judged {
+        let finished = |judged| if self.is_out_of_reach(best, &judged) { judged } else { self.finished(judged) };
+        let refined = finished(refine(judged.clone()));
+        if is_possible(&refined) || !is_possible(&judged) { refined } else { finished(judged) }
+    }
+
+    /// Whether a hypothesis explains so much less than a best one that says all that the end of its fit changes nothing.
+    fn is_out_of_reach(&self, best: Option<&Judged>, other: &Judged) -> bool {
+        let says_all = |best: &&Judged| is_possible(best) && !is_unsound(&best.fitted.losses, &self.bench.data);
+        best.filter(says_all).is_some_and(|best| {
+            let before = beyond_noise(&self.baseline.losses);
+            let may_be_simpler = other.fitted.hypothesis.size() < best.fitted.hypothesis.size();
+            !leaves_at_most(&other.fitted.losses, |signal| {
+                let of_form = if may_be_simpler { left_by_form(before[&signal]) } else { 0.0 };
+                OUT_OF_REACH * left_by_structure(signal, &self.bench.data).max(of_form)
+            })
+        })
     }
 
     /// A hypothesis refined in all its effects and, where something is left then, further refined, and with one of them in another form.
-    fn in_best_form(&self, judged: Judged) -> Judged {
-        let refined = self.finished_refined(judged.clone(), |judged| self.refined(judged));
+    fn in_best_form(&self, judged: Judged, best: Option<&Judged>) -> Judged {
+        let refined = self.finished_refined(judged.clone(), best, |judged| self.refined(judged));
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;
         }
@@ -64,8 +83,9 @@ impl Search<'_, '_> {
             .parts
             .iter()
             .any(|part| ![Refined::NOT, self.bench.fully(part.effect)].contains(&part.refined));
-        let further = partly.then(|| self.finished_refined(refined.clone(), |judged| self.refined(judged)));
-        let other = self.in_other_forms(&judged).map(|other| self.finished_refined(other, |other| self.refined(other)));
+        let further = partly.then(|| self.finished_refined(refined.clone(), best, |judged| self.refined(judged)));
+        let other =
+            self.in_other_forms(&judged).map(|other| self.finished_refined(other, best, |other| self.refined(other)));
         let all = further.into_iter().chain(other).filter(|fit| is_possible(fit) || !is_possible(&refined));
         all.chain([refined.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
     }
@@ -151,12 +171,11 @@ impl Search<'_, '_> {
     /// Hypotheses of several effects, those in their best form that a form may keep from rivalling the best.
     pub(super) fn rivals_in_best_form(&self, level: Vec<Judged>) -> Vec<Judged> {
         let best = possible(&level).filter(|best| self.may_be_form(&best.fitted.losses));
-        let Some(best) = best.map(|best| best.fitted.hypothesis.names()) else { return level };
-        let lacks_form =
-            |judged: &Judged| judged.explained > LEAST_EXPLAINED_EXACTLY.0 && judged.fitted.hypothesis.names() != best;
+        let Some(best) = best.cloned() else { return level };
+        let lacks_form = |judged: &Judged| judged.explained > LEAST_EXPLAINED_EXACTLY.0 && !same_effects(judged, &best);
         let (mut close, mut rest): (Vec<_>, Vec<_>) = level.into_iter().partition(lacks_form);
         rest.extend(close.split_off(close.len().min(MAY_BE_RIVALS)));
-        let close = close.into_par_iter().map(|judged| self.in_best_form(judged));
+        let close = close.into_par_iter().map(|judged| self.in_best_form(judged, Some(&best)));
         sorted(close.chain(rest).collect())
     }
 }
