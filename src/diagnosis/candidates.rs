@@ -522,10 +522,7 @@ impl<'a> Bench<'a> {
             Some((off, weighted(&slope, &weights).into_iter().map(|slope| slope * deviation).collect()))
         });
         let (off, columns): (Vec<f64>, Vec<Vec<f64>>) = expected.unzip();
-        let known = normal_matrix(&columns) + DMatrix::identity(columns.len(), columns.len());
-        // Of a positive definite matrix; its determinant is the squared product of the factor's diagonal.
-        let precision: f64 = known.cholesky().map_or(0.0, |factor| factor.l().diagonal().iter().map(|d| d.ln()).sum());
-        0.5 * off.iter().map(|off| off * off).sum::<f64>() + precision
+        price(&off, &columns)
     }
 
     fn slopes_at(&self, model: &Parameters, residuals: &[f64]) -> Slopes {
@@ -729,6 +726,15 @@ pub(super) fn bounds(variables: &[&'static Variable], start: &Parameters) -> Vec
     variables.iter().map(bounds).collect()
 }
 
+/// What parameters that were expected at zero, within one, take off the logarithm of the odds, where they are, given what a change of each by
+/// one does to residuals in units of their noise.
+fn price(off: &[f64], columns: &[Vec<f64>]) -> f64 {
+    let known = normal_matrix(columns) + DMatrix::identity(columns.len(), columns.len());
+    // Of a positive definite matrix; its determinant is the squared product of the factor's diagonal.
+    let precision: f64 = known.cholesky().map_or(0.0, |factor| factor.l().diagonal().iter().map(|d| d.ln()).sum());
+    0.5 * off.iter().map(|off| off * off).sum::<f64>() + precision
+}
+
 /// Sum of weighted squares.
 fn cost(residuals: &[f64], weights: &[f64]) -> f64 {
     weighted(residuals, weights).iter().map(|r| r * r).sum()
@@ -736,4 +742,28 @@ fn cost(residuals: &[f64], weights: &[f64]) -> f64 {
 
 fn weighted(residuals: &[f64], weights: &[f64]) -> Vec<f64> {
     residuals.iter().zip(weights).map(|(residual, weight)| residual * weight).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_price_is_what_the_evidence_of_a_linear_model_takes_off_its_likelihood() {
+        // y = A x + noise with variances of one all over: y is normal with the covariance C = 1 + A Aᵀ, so that
+        // −2 ln p(y) = yᵀ C⁻¹ y + ln det C, but for a constant.
+        let slopes = DMatrix::from_fn(7, 3, |i, k| (1.3 * i as f64 + 2.1 * k as f64).sin() * (k as f64 + 0.5));
+        let measured = DVector::from_fn(7, |i, _| 3.0 * (0.7 * i as f64).cos());
+        let covariance = DMatrix::identity(7, 7) + &slopes * slopes.transpose();
+        let solved = covariance.clone().lu().solve(&measured).unwrap();
+        let evidence = -0.5 * (measured.dot(&solved) + covariance.determinant().ln());
+
+        let normal = slopes.transpose() * &slopes + DMatrix::identity(3, 3);
+        let fitted = normal.lu().solve(&(slopes.transpose() * &measured)).unwrap();
+        let left = &measured - &slopes * &fitted;
+        let columns: Vec<Vec<f64>> = slopes.column_iter().map(|column| column.iter().copied().collect()).collect();
+        let paid = price(fitted.as_slice(), &columns);
+        assert!((-0.5 * left.norm_squared() - paid - evidence).abs() < 1e-9, "{paid} {evidence}");
+        assert!(paid > 0.5, "{paid}");
+    }
 }
