@@ -142,8 +142,8 @@ pub struct Diagnosis {
 /// Diagnoses recordings against a nominal model.
 ///
 /// `tolerance` is the relative error of the nominal coefficients below which nothing is called wrong; `done` is told
-/// after each of the `1 + candidates` fits, of which there may be two rounds. What is set
-/// anew in each recording is found where these are [`numbered`](crate::measurement::numbered).
+/// after each of the `1 + candidates` fits, of which there may be two rounds. What is set anew in each recording is
+/// found where these are [`numbered`](crate::measurement::numbered).
 ///
 /// # Errors
 /// [`Error::Recording`] where nothing can be compared; errors of the simulation of the nominal model.

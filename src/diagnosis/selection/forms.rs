@@ -2,7 +2,7 @@
 
 use super::evidence::{beyond_noise, is_unsound, leaves_at_most, left_by_form, left_by_structure};
 use super::naming::{LEAST_EXPLAINED, LEAST_EXPLAINED_EXACTLY};
-use super::{Judged, Search, carried_on, is_possible, possible, same_effects, sorted};
+use super::{Judged, Search, carried_on, is_possible, possible, price_of_parameter, same_effects, sorted};
 use crate::diagnosis::candidates::{Fitted, Part, Refined, Slopes};
 use crate::diagnosis::residuals::Scope;
 use rayon::prelude::*;
@@ -39,8 +39,10 @@ impl Search<'_, '_> {
             _ if may_be_form => self.finished_refined(judged, Some(&best), |judged| self.refined(judged)),
             parts => self.finished_refined(judged, None, |judged| self.part_refined(judged, parts - 1)),
         });
-        let refined: Vec<Judged> = refined.collect();
-        sorted(refined.into_iter().chain([best]).chain(rest).collect())
+        let mut all: Vec<Judged> = refined.collect();
+        all.push(best);
+        all.extend(rest);
+        sorted(all)
     }
 
     fn finished(&self, judged: Judged) -> Judged {
@@ -124,38 +126,36 @@ impl Search<'_, '_> {
             return judged;
         }
         let fully = self.bench.fully(part.effect);
-        if part.refined == fully && fully != Refined::NOT {
+        let is_plain = part.refined == Refined::NOT;
+        let mut ways = if is_plain {
+            vec![fully, Refined::NOT]
+        } else if part.refined == fully {
             return judged;
-        }
+        } else {
+            vec![fully]
+        };
+        ways.dedup(); // where there is none
         // What hangs on details hangs on what the corrections do here, too.
         let slopes = self.bench.slopes_of(&judged.fitted);
-        let refined_by = |refined| self.refined_by(&judged, which, refined, &slopes);
-        let is_plain = part.refined == Refined::NOT;
-        let mut ways = vec![fully];
-        ways.extend((is_plain && fully != Refined::NOT).then_some(Refined::NOT));
-        let mut fits: Vec<Judged> = ways.into_par_iter().filter_map(refined_by).collect();
+        let refined_by = |ways: Vec<Refined>| -> Vec<Judged> {
+            ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes)).collect()
+        };
+        let mut fits = refined_by(ways);
         // Where all refinements together are not worth the price of one, none of them is.
         if is_plain && self.may_pay(&fits) {
-            fits.extend(
-                fully
-                    .each()
-                    .filter(|one| *one != fully)
-                    .collect::<Vec<_>>()
-                    .into_par_iter()
-                    .filter_map(refined_by)
-                    .collect::<Vec<_>>(),
-            );
+            fits.extend(refined_by(fully.each().filter(|one| *one != fully).collect()));
         }
         // A refinement that ends where the cause cannot be says nothing of the cause.
         let better = fits.into_iter().filter(|better| is_possible(better) || !is_possible(&judged));
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
-    /// Whether of fits of the same effects the first is so much more likely than the last that a parameter more may pay.
+    /// Whether the first of two fits of the same effects is so much more likely than the second that a parameter more may pay; where one
+    /// of them failed, it may.
     fn may_pay(&self, fits: &[Judged]) -> bool {
-        let [most, .., least] = fits else { return true };
-        let [with, without] = [most, least].map(|judged| self.bench.data.log_likelihood(&judged.fitted.losses));
-        with - without > 0.5 * (most.fitted.residuals.len() as f64).ln()
+        let [refined, plain] = fits else { return true };
+        let [with, without] = [refined, plain].map(|judged| self.bench.data.log_likelihood(&judged.fitted.losses));
+        with - without > price_of_parameter(&plain.fitted)
     }
 
     fn refined_by(&self, judged: &Judged, which: usize, refined: Refined, slopes: &Slopes) -> Option<Judged> {

@@ -117,7 +117,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let evidence = evidence(&self.baseline, &fitted);
         let explained = explained(&self.baseline.losses, &fitted.losses, &self.bench.data);
         let score = self.bench.data.log_likelihood(&fitted.losses)
-            - 0.5 * fitted.hypothesis.size() as f64 * (fitted.residuals.len() as f64).ln();
+            - fitted.hypothesis.size() as f64 * price_of_parameter(&fitted);
         Judged { fitted, evidence, score, explained }
     }
 
@@ -326,6 +326,11 @@ impl<'a, 'b> Search<'a, 'b> {
     fn may_show(&self) -> bool {
         !leaves_at_most(&self.baseline.losses, |signal| self.bench.data.structure(signal).max(NEGLIGIBLE))
     }
+}
+
+/// What each parameter takes off the score of a fit.
+fn price_of_parameter(fitted: &Fitted) -> f64 {
+    0.5 * (fitted.residuals.len() as f64).ln()
 }
 
 /// How many effects the hypotheses of a level have; 0 where there are none.
