@@ -313,13 +313,14 @@ pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
     if lack(0.0) <= 0.0 || lack(highest) > 0.0 { nominal } else { bisect(lack, 0.0, highest) }
 }
 
-/// Contraction in m at which the muscle holds a weight in N at a gauge pressure in Pa, at rest, with the effects as they
-/// are at the start; `None` where there is none.
+/// Contraction in m at which the muscle holds a weight in N at a gauge pressure in Pa, at rest or as slow as the effects have it
+/// start, with these as they are at the start; `None` where there is none.
 ///
 /// Among several it is the longest muscle whose stiffness is positive.
 pub fn equilibrium(parameters: &Parameters, gauge_pressure: f64, weight: f64) -> Option<f64> {
     let muscle = &parameters.muscle;
-    let surplus = |contraction: f64| resting_pull(parameters, &at_rest(gauge_pressure, contraction)) - weight;
+    let velocity = parameters.effects.start_velocity();
+    let surplus = |contraction: f64| resting_pull(parameters, &moved(gauge_pressure, contraction, velocity)) - weight;
     let samples = 300;
     let at = |k: i32| muscle.rest_length * (-0.2 + 0.7 * f64::from(k) / f64::from(samples));
     let bracket = (0..samples).find(|&k| surplus(at(k)) > 0.0 && surplus(at(k + 1)) <= 0.0)?;
@@ -370,8 +371,9 @@ impl System for PneumaticMuscle {
         let hanging = equilibrium(parameters, gauge_pressure, mass * GRAVITY + inputs.external_force);
         let contraction = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
         let mut state = [0.0; HANGING_STATES];
-        state[..2].copy_from_slice(&[gauge_pressure, contraction]);
-        state[3..].copy_from_slice(&effects_at_start(parameters, &at_rest(gauge_pressure, contraction)));
+        let velocity = parameters.effects.start_velocity();
+        state[..3].copy_from_slice(&[gauge_pressure, contraction, velocity]);
+        state[3..].copy_from_slice(&effects_at_start(parameters, &moved(gauge_pressure, contraction, velocity)));
         Ok(Extended(state))
     }
 

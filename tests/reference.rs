@@ -335,6 +335,17 @@ fn effects_agree_with_scipy() {
             ],
         ),
         (
+            "sinking_friction",
+            &[
+                ("friction_hysteresis.half_width", 9.0),
+                ("friction_hysteresis.half_width_per_pressure", 8e-5),
+                ("friction_hysteresis.smoothing_velocity", 2e-3),
+                ("friction_hysteresis.start", 0.4),
+                ("friction_hysteresis.second_start", -1.0),
+                ("friction_hysteresis.recording", 2.0),
+            ],
+        ),
+        (
             "cord_friction",
             &[
                 ("friction_hysteresis.half_width", 9.0),

@@ -1,7 +1,10 @@
-use super::{Description, Effect, Holds, Point, REFERENCE_FORCE};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, of_recording};
 
 /// Smallest velocity in m/s over which a friction without a loop changes its sign.
 const LEAST_SMOOTHING: f64 = 2e-4;
+
+/// Share of a friction without a loop with which it starts at most: what is nearer to all of it is a matter of high speeds.
+const FULLY: f64 = 0.99;
 
 crate::variables::variables! {
     /// Dry friction between threads and rubber: a loss that depends on the way, not on its speed.
@@ -10,8 +13,9 @@ crate::variables::variables! {
     /// F ← F − (w₀ + w₁ p + μ |F|) h (1 + c exp(−(v/v_s)²)), with the loop h = (1 − m) z₁ + m z₂ of two elements that pass it
     /// within the displacements s and r s: s dz/dx = 1 − (γ sgn(v z) + 1 − γ) |z|ⁿ. `half_width` w₀,
     /// `half_width_per_pressure` w₁, `half_width_per_pull` μ, `presliding_displacement` s, `second_share` m, `second_ratio` r, `knee` n,
-    /// `unloading` γ, `stribeck_share` c, `stribeck_velocity` v_s. n = γ = 1 is the law of Dahl. Both z start at
-    /// `start` and stay within ±1. With a `smoothing_velocity` v₀ it is Coulomb's law without a memory, h = tanh(v/v₀).
+    /// `unloading` γ, `stribeck_share` c, `stribeck_velocity` v_s. n = γ = 1 is the law of Dahl. Both z stay within ±1. With a
+    /// `smoothing_velocity` v₀ it is Coulomb's law without a memory, h = tanh(v/v₀). A hanging load starts in balance with h at
+    /// `start`, by `second_start` and `third_start` more in these recordings.
     ///
     /// # In the data
     /// The force residual changes sign at every reversal; its width does not depend on speed. Triangles of shrinking
@@ -52,6 +56,12 @@ crate::variables::variables! {
         stribeck_velocity: f64 = 0.01, METRE_PER_SECOND, (1e-4..=1.0);
         /// Where in the loop the friction starts: -1 after lengthening, 1 after shortening
         start: f64 = 0.0, ONE, (-1.0..=1.0);
+        /// By how much more in the second of several recordings: each begins with a past of its own
+        second_start: f64 = 0.0, ONE, (-2.0..=2.0);
+        /// By how much more in the third
+        third_start: f64 = 0.0, ONE, (-2.0..=2.0);
+        /// Which of the recordings is simulated: from the fourth on as the first
+        recording: f64 = 1.0, ONE, (1.0..=1000.0);
     }
 }
 
@@ -59,6 +69,11 @@ impl FrictionHysteresis {
     fn width(&self, gauge_pressure: f64, pull: f64) -> f64 {
         let of_pressure = self.half_width + self.half_width_per_pressure * gauge_pressure.max(0.0);
         of_pressure + self.half_width_per_pull * pull.abs()
+    }
+
+    /// Share of the half width that acts at the start of the recording that is simulated, with its sign.
+    fn engaged_at_start(&self) -> f64 {
+        (self.start + of_recording(self.recording, [self.second_start, self.third_start])).clamp(-1.0, 1.0)
     }
 
     /// Rate of an element at `z` while the muscle moves by `velocity` in units of its displacement per second.
@@ -118,6 +133,8 @@ impl Effect for FrictionHysteresis {
             ("friction_hysteresis.stribeck_share", &[0.1]),
             ("friction_hysteresis.half_width_per_pull", &[0.01]),
             ("friction_hysteresis.start", &[0.3, -0.3]),
+            ("friction_hysteresis.second_start", &[0.3, -0.3]),
+            ("friction_hysteresis.third_start", &[0.3, -0.3]),
         ],
     };
     const STATE_SCALES: &'static [f64] = &[1.0, 1.0];
@@ -127,7 +144,14 @@ impl Effect for FrictionHysteresis {
     }
 
     fn start(&self, _at: &Point, own: &mut [f64]) {
-        own.fill(self.start);
+        own.fill(self.engaged_at_start());
+    }
+
+    fn start_velocity(&self) -> f64 {
+        if self.is_neutral() {
+            return 0.0;
+        }
+        self.smoothing_velocity * self.engaged_at_start().clamp(-FULLY, FULLY).atanh()
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {

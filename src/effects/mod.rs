@@ -192,6 +192,10 @@ pub trait Effect: Declared + Default {
     fn rests_off(&self) -> f64 {
         0.0
     }
+    /// Velocity in m/s, of contraction, by which a load that hangs is off its rest at the start, more slowly than inertia would matter.
+    fn start_velocity(&self) -> f64 {
+        0.0
+    }
     /// What it does at a time in s since the start whatever the muscle does, where it goes its own way over time; SI.
     fn own_course(&self, _time: f64) -> f64 {
         0.0
@@ -372,6 +376,11 @@ macro_rules! effects {
             /// Gauge pressure in Pa by which the valve rests off its target.
             pub fn rests_off(&self) -> f64 {
                 0.0 $(+ self.$field.rests_off())*
+            }
+
+            /// Velocity in m/s with which a load that hangs starts.
+            pub fn start_velocity(&self) -> f64 {
+                0.0 $(+ self.$field.start_velocity())*
             }
 
             /// What the effect with this name does at a time in s since the start whatever the muscle does; SI.
