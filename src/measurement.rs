@@ -285,6 +285,13 @@ impl Recording {
         })
     }
 
+    /// The recording with something added to all readings of a signal, in its SI unit.
+    pub fn shifted(&self, signal: Signal, by: f64) -> Self {
+        let mut shifted = self.clone();
+        shifted.signals.get_mut(&signal).into_iter().flatten().for_each(|value| *value += by);
+        shifted
+    }
+
     /// The recording with an instant more in the middle between any two samples; what a signal is there is told by its values, their
     /// gaps bridged, and the position of the first of both.
     fn with_middles(&self, middle: impl Fn(Signal, &[f64], usize) -> f64) -> Self {

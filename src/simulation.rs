@@ -9,6 +9,7 @@ use crate::plant::{
     ActuatorInputs, ActuatorOutputs, MeasuredInputs, MuscleAlone, MuscleInputs, MuscleOutputs, PneumaticActuator,
     PneumaticMuscle, masses, resting_pressure, steady_pressure,
 };
+use crate::quality::sensors::resolution;
 use crate::reference::ReferenceTrajectory;
 use crate::variables::Signals;
 use crate::{GRAVITY, Result};
@@ -149,6 +150,18 @@ fn initial_pressure(parameters: &Parameters, recording: &Recording, command: &[f
             steady_pressure(parameters, command[0], parameters.effects.true_contraction(contraction, 0.0, 0.0))
         }
     }
+}
+
+/// Standard deviation in Pa of the pressure that readings tell at the start of a recording, given the noise of one and how many of them are
+/// worth one that is independent; `None` where none tells it.
+pub(crate) fn start_deviation(recording: &Recording, noise: f64, inflation: f64) -> Option<f64> {
+    let (command, readings) = (recording.bridged(Signal::Command)?, recording.bridged(Signal::GaugePressure)?);
+    let first = resting(&recording.time, &command, &readings);
+    // The end of a straight line through readings is four times as uncertain as their mean.
+    let of_line = if first > START_SAMPLES { 4.0 } else { 1.0 };
+    let of_noise = noise * (of_line * inflation / first as f64).sqrt().min(1.0);
+    // What rests shows the same steps all the time.
+    Some(of_noise.hypot(resolution(&readings).unwrap_or(0.0) / 12.0_f64.sqrt()))
 }
 
 /// How many of the first readings show the pressure at the start: as many as there are before the command moves, unless they move

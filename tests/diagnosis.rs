@@ -40,6 +40,18 @@ fn nothing_is_wrong_where_nothing_is() {
 }
 
 #[test]
+fn a_pressure_that_tells_the_start_only_roughly_is_no_cause() {
+    // Rounded as coarsely it starts 15 mbar too low: the load swings by 0.6 mm before it is where the valve has it.
+    let rounded = |steps: f64| (steps / 0.045).round() * 0.045;
+    let coarse = recording("nominal_40kg.csv", |_, column, cell| match cell.parse::<f64>() {
+        Ok(value) if column == "gauge_pressure" => format!("{:.3}", rounded(value)),
+        _ => cell.to_owned(),
+    });
+    let found = diagnosis_of(&[coarse]);
+    assert_eq!((found.verdict, causes(&found)), (Verdict::Nominal, vec![]));
+}
+
+#[test]
 fn friction_is_found_with_its_size() {
     // The generator rubs with 12.67 N/bar in five Maxwell elements, the model with one of Dahl's.
     for names in [&["dry_friction_20kg.csv", "dry_friction_60kg.csv"][..], &["dry_friction_20kg.csv"]] {

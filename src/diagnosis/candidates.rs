@@ -23,12 +23,13 @@ const OF_POLYNOMIAL: [(&str, f64); 8] = [
     ("virtual_area.elastic_2", 1.0),
     ("virtual_area.elastic_3", 1.0),
 ];
-/// Correction of shape with its expected size in units of the tolerance: no polynomial is quite the muscle.
-const SHAPE_OF_POLYNOMIAL: [(&str, f64); 1] = [("muscle.area_bend", 0.1)];
+/// Corrections of shape with their expected size in units of the tolerance: no polynomial is quite the muscle.
+const SHAPE_OF_POLYNOMIAL: [(&str, f64); 2] = [("muscle.area_bend", 0.1), ("muscle.area_wave", 0.1)];
 /// Corrections of a muscle that is off as a whole, be it a polynomial or not.
 const AS_A_WHOLE: [(&str, f64); 2] = [("muscle.area_scale", 1.0), ("muscle.elastic_scale", 1.0)];
 /// Corrections of shape of a polynomial that is off as a whole: its slope is not among the coefficients then.
-const SHAPE_AS_A_WHOLE: [(&str, f64); 2] = [("muscle.area_tilt", 0.1), ("muscle.area_bend", 0.1)];
+const SHAPE_AS_A_WHOLE: [(&str, f64); 3] =
+    [("muscle.area_tilt", 0.1), ("muscle.area_bend", 0.1), ("muscle.area_wave", 0.1)];
 /// Corrections of shape of any other force, whose coefficients may all act alike or cancel each other.
 const SHAPE_OF_COURSE: [(&str, f64); 3] =
     [("muscle.area_tilt", 0.4), ("muscle.area_bend", 0.2), ("muscle.elastic_tilt", 0.6)];
@@ -152,8 +153,8 @@ impl Part {
 /// How many recordings there must be for a parameter to mean anything: some hold in the second or in the third alone.
 pub(super) fn recordings_for(name: &str) -> usize {
     match name.split('.').next_back() {
-        Some("second" | "second_phase") => 2,
-        Some("third" | "third_phase") => 3,
+        Some("second" | "second_phase" | "second_start") => 2,
+        Some("third" | "third_phase" | "third_start") => 3,
         _ => 1,
     }
 }

@@ -170,6 +170,7 @@ pub fn diagnose(
         }
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;
+        for_fits.doubt_starts(nominal);
         let mut bench = Bench::new(for_fits, nominal, tolerance, *off);
         let baseline = baseline(&mut bench).ok_or_else(cannot_follow)?;
         done("nominal");

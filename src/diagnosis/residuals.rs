@@ -5,7 +5,8 @@ use crate::integrator;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality::correlation;
-use crate::simulation::{OUTPUTS, replay, replay_within};
+use crate::quality::sensors::resolution;
+use crate::simulation::{OUTPUTS, replay, replay_within, start_deviation};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -46,6 +47,9 @@ pub struct Data<'a> {
     noise: BTreeMap<Signal, Noise>,
     /// Per residual, the error in SI that a jump of the command leaves since its instant between two samples is not known.
     mistimed: Vec<f64>,
+    /// Per residual, the error in SI that the pressure at the start of its recording leaves since readings tell it no better: one
+    /// standard deviation; empty where it counts as known.
+    by_start: Vec<f64>,
     tolerance: f64,
     /// Tolerance of the integration, see [`integrator::advance`].
     pub integration: f64,
@@ -66,6 +70,8 @@ pub struct Loss {
     pub structure: f64,
     /// Number of samples that are worth an independent one, judged from how these residuals hang together.
     pub effective: f64,
+    /// The same if they hang together as noise and the structural error do.
+    pub effective_beside_structure: f64,
 }
 
 /// Which samples are looked at.
@@ -102,6 +108,7 @@ impl<'a> Data<'a> {
             segments: segments(recordings, nominal)?,
             noise: BTreeMap::new(),
             mistimed: Vec::new(),
+            by_start: Vec::new(),
             tolerance,
             integration: integrator::TOLERANCE,
         };
@@ -150,8 +157,10 @@ impl<'a> Data<'a> {
             of_signal.map(|segment| {
                 let series = self.series(segment, residuals);
                 let noise = noise::estimate(&series, self.recordings[segment.recording].period());
-                let finest = FINEST * span(self.measured(segment));
-                (segment.samples.len() as f64, noise.level.max(finest).powi(2), noise.inflation)
+                let measured = self.measured(segment);
+                let rounding = resolution(measured).unwrap_or(0.0) / 12.0_f64.sqrt();
+                let least = rounding.max(FINEST * span(measured));
+                (segment.samples.len() as f64, noise.level.max(least).powi(2), noise.inflation)
             })
         };
         let pooled = |signal: Signal| {
@@ -207,9 +216,48 @@ impl<'a> Data<'a> {
     }
 
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
-    /// simulated.
+    /// simulated. What the pressure at the start does to them counts less, the more it is in doubt.
     pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
-        self.residuals_on(self.recordings, 1, parameters)
+        let mut residuals = self.residuals_on(self.recordings, 1, parameters)?;
+        if !self.by_start.is_empty() {
+            (0..self.recordings.len()).for_each(|recording| self.whiten(recording, &mut residuals));
+        }
+        Some(residuals)
+    }
+
+    /// Takes the pressure at the start for known no better than its readings tell; a model says what that does.
+    pub fn doubt_starts(&mut self, parameters: &Parameters) {
+        let Some(noise) = self.noise.get(&Signal::GaugePressure) else { return };
+        let deviation = |recording| start_deviation(recording, noise.level, noise.inflation).unwrap_or(0.0);
+        let deviations: Vec<f64> = self.recordings.iter().map(deviation).collect();
+        let off = |by: f64| {
+            let shifted =
+                self.recordings.iter().zip(&deviations).map(|(r, of)| r.shifted(Signal::GaugePressure, by * of));
+            self.residuals_on(&shifted.collect::<Vec<_>>(), 1, parameters)
+        };
+        if let (Some(less), Some(more)) = (off(-1.0), off(1.0)) {
+            self.by_start = more.iter().zip(&less).map(|(more, less)| 0.5 * (more - less)).collect();
+        }
+    }
+
+    /// With an error at the start that does c to the residuals e of a recording, both in units of the noise, their covariance is
+    /// C = 1 + c cᵀ; C^−½ e is white again.
+    fn whiten(&self, recording: usize, residuals: &mut [f64]) {
+        let of_recording = || self.segments.iter().filter(|segment| segment.recording == recording);
+        let (mut doubt, mut shared) = (0.0, 0.0);
+        for segment in of_recording() {
+            let noise = self.noise[&segment.signal];
+            let weight = 1.0 / (noise.level.powi(2) * noise.inflation);
+            for at in segment.range.clone() {
+                doubt += weight * self.by_start[at].powi(2);
+                shared += weight * self.by_start[at] * residuals[at];
+            }
+        }
+        if doubt > 0.0 {
+            let share = (1.0 - 1.0 / (1.0 + doubt).sqrt()) / doubt * shared;
+            let all = of_recording().flat_map(|segment| segment.range.clone());
+            all.for_each(|at| residuals[at] -= share * self.by_start[at]);
+        }
     }
 
     /// By how much the residuals of a model change where inputs go along cubics between their samples instead of along straight
@@ -254,12 +302,16 @@ impl<'a> Data<'a> {
         self.weights_by(scope, |_, noise| noise.inflation)
     }
 
-    /// The same for all samples, where there is the structural error of a sound nominal model as well, one for each block.
+    /// The same for all samples, where there is the structural error of a sound nominal model as well.
     pub fn weights_beside_structure(&self) -> Vec<f64> {
-        self.weights_by(Scope::All, |segment, noise| {
-            let per_block = BLOCK / self.recordings[segment.recording].period();
-            noise.inflation + per_block * self.structure(segment.signal)
-        })
+        self.weights_by(Scope::All, |segment, _| self.inflation_beside_structure(segment))
+    }
+
+    /// Variance of sums of a segment's residuals relative to that of as many independent ones of the noise, where there is the structural
+    /// error of a sound nominal model as well, one for each block.
+    fn inflation_beside_structure(&self, segment: &Segment) -> f64 {
+        let per_block = BLOCK / self.recordings[segment.recording].period();
+        self.noise[&segment.signal].inflation + per_block * self.structure(segment.signal)
     }
 
     fn weights_by(&self, scope: Scope, variance: impl Fn(&Segment, Noise) -> f64) -> Vec<f64> {
@@ -286,13 +338,16 @@ impl<'a> Data<'a> {
             };
             let (scaled, doubtless): (Vec<f64>, Vec<f64>) =
                 in_scope.map(|(_, at)| (residuals[at] / level, excused(at))).unzip();
+            let structure = self.structure(segment.signal);
             (!scaled.is_empty()).then(|| Loss {
                 signal: segment.signal,
                 samples: scaled.len(),
                 excess: mean_square(&scaled),
                 doubtless: doubtless.iter().sum::<f64>() / doubtless.len() as f64,
-                structure: self.structure(segment.signal),
+                structure,
                 effective: effective_samples(&scaled, self.recordings[segment.recording].period()),
+                effective_beside_structure: scaled.len() as f64 * (1.0 + structure)
+                    / self.inflation_beside_structure(segment),
             })
         };
         self.segments.iter().filter_map(of_segment).collect()

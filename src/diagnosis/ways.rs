@@ -47,9 +47,9 @@ impl Found<'_> {
         let [own, others] = [&self.chosen.best, &other.chosen.best];
         let losses = |fitted: &Fitted| other.bench.data.losses(&fitted.residuals, Scope::All);
         let (mut with, without) = (losses(own), losses(others));
-        // The whiter residuals say how much a sample is worth.
+        // The whiter residuals say how much a sample is worth, but no shape of a sound muscle is worth more than once in a block.
         for (a, b) in with.iter_mut().zip(&without) {
-            a.effective = a.effective.max(b.effective);
+            a.effective = a.effective.max(b.effective).min(a.effective_beside_structure);
         }
         let more = own.hypothesis.size() as f64 - others.hypothesis.size() as f64;
         odds(&without, &with, more) - self.bench.price(own) + other.bench.price(others)

@@ -127,6 +127,7 @@ impl Structure {
         base.muscle.elastic_scale = neutral.elastic_scale;
         base.muscle.area_tilt = neutral.area_tilt;
         base.muscle.area_bend = neutral.area_bend;
+        base.muscle.area_wave = neutral.area_wave;
         base.muscle.elastic_tilt = neutral.elastic_tilt;
         let probes: Vec<Point> = thinned(points.len(), PROBES).into_iter().map(|k| points[k]).collect();
         let own = candidates(&base, ForceModels::GROUPS[position(model)], points);

@@ -31,6 +31,8 @@ crate::variables::variables! {
         area_tilt: f64 = 0.0, ONE, (-1.0..=1.0);
         /// Correction of the virtual area in the middle of the stroke against its ends
         area_bend: f64 = 0.0, ONE, (-1.0..=1.0);
+        /// Correction of the virtual area that rises, falls and rises again over the stroke
+        area_wave: f64 = 0.0, ONE, (-1.0..=1.0);
         /// Correction of the elastic force that grows with contraction
         elastic_tilt: f64 = 0.0, ONE, (-1.0..=1.0);
     }
@@ -55,7 +57,8 @@ impl Muscle {
     #[inline]
     fn area_correction(&self, contraction: f64) -> f64 {
         let stroke = self.stroke(contraction);
-        self.area_scale + self.area_tilt * stroke + self.area_bend * (1.5 * stroke * stroke - 0.5)
+        let (bend, wave) = (1.5 * stroke * stroke - 0.5, stroke * (2.5 * stroke * stroke - 1.5));
+        self.area_scale + self.area_tilt * stroke + self.area_bend * bend + self.area_wave * wave
     }
 
     /// Factor on the elastic force at a contraction in m.

@@ -4,7 +4,7 @@
 //! for a person; where going on makes no sense it is an error. Every limit states its reason where it is declared.
 
 mod sampling;
-mod sensors;
+pub(crate) mod sensors;
 mod units;
 
 use crate::Result;

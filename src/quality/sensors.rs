@@ -141,7 +141,7 @@ fn without_noise(recording: &Recording, signal: Signal) -> Option<String> {
     let quietest = QUIETEST * span(values);
     let scatter: Vec<f64> = known.windows(7).map(|seven| off_the_curve(&recording.time, values, seven)).collect();
     // Coarse resolution hides noise: then nothing can be said.
-    let quiet = quantile(&scatter, 0.5)? < quietest && step(values)? < quietest;
+    let quiet = quantile(&scatter, 0.5)? < quietest && resolution(values)? < quietest;
     let text = || {
         format!(
             "`{}` has no noise, not a millionth of what it spans: it looks simulated, and what is found then holds for \
@@ -163,7 +163,7 @@ fn off_the_curve(time: &[f64], values: &[f64], seven: &[usize]) -> f64 {
 }
 
 /// Smallest step between neighbouring values: the resolution of what was written; `None` where nothing changes.
-fn step(values: &[f64]) -> Option<f64> {
+pub(crate) fn resolution(values: &[f64]) -> Option<f64> {
     let known = present(values);
     known.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).reduce(f64::min)
 }
@@ -218,7 +218,7 @@ fn same_but_for_scale(from: &[f64], to: &[f64]) -> Option<(f64, f64)> {
     if from.len() != to.len() {
         return None;
     }
-    let (step_from, step_to) = (step(from)?, step(to)?);
+    let (step_from, step_to) = (resolution(from)?, resolution(to)?);
     let both: Vec<(f64, f64)> =
         from.iter().copied().zip(to.iter().copied()).filter(|(a, b)| !a.is_nan() && !b.is_nan()).collect();
     let mean = |pick: fn(&(f64, f64)) -> f64| both.iter().map(pick).sum::<f64>() / both.len() as f64;
