@@ -308,7 +308,8 @@ pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
     if parameters.are_nominal() {
         return nominal;
     }
-    let lack = |gauge_pressure: f64| weight - resting_pull(parameters, &at_rest(gauge_pressure, contraction));
+    let velocity = parameters.effects.start_velocity();
+    let lack = |gauge_pressure: f64| weight - resting_pull(parameters, &moved(gauge_pressure, contraction, velocity));
     let highest = 2.0 * nominal + 5e5;
     if lack(0.0) <= 0.0 || lack(highest) > 0.0 { nominal } else { bisect(lack, 0.0, highest) }
 }

@@ -161,7 +161,8 @@ pub(crate) fn start_deviation(recording: &Recording, noise: f64, inflation: f64)
     let of_line = if first > START_SAMPLES { 4.0 } else { 1.0 };
     let of_noise = noise * (of_line * inflation / first as f64).sqrt().min(1.0);
     // What rests shows the same steps all the time.
-    Some(of_noise.hypot(resolution(&readings).unwrap_or(0.0) / 12.0_f64.sqrt()))
+    let step = recording.get(Signal::GaugePressure).and_then(resolution).unwrap_or(0.0);
+    Some(of_noise.hypot(step / 12.0_f64.sqrt()))
 }
 
 /// How many of the first readings show the pressure at the start: as many as there are before the command moves, unless they move
