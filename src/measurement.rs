@@ -226,6 +226,11 @@ impl Recording {
         self.get(LoadMass)?.iter().copied().find(|mass| !mass.is_nan())
     }
 
+    /// Time from the first sample to the last, s.
+    pub fn duration(&self) -> f64 {
+        self.time[self.time.len() - 1] - self.time[0]
+    }
+
     /// Usual time between samples, s.
     pub fn period(&self) -> f64 {
         let mut steps: Vec<f64> = self.time.windows(2).map(|pair| pair[1] - pair[0]).collect();

@@ -186,8 +186,7 @@ pub fn diagnose(
 
 /// The recordings with as many samples as fits need.
 fn thinned(recordings: &[Recording]) -> Vec<Recording> {
-    let span = |recording: &Recording| recording.time[recording.time.len() - 1] - recording.time[0];
-    let period = recordings.iter().map(span).sum::<f64>() / MANY_SAMPLES;
+    let period = recordings.iter().map(Recording::duration).sum::<f64>() / MANY_SAMPLES;
     recordings.iter().map(|recording| recording.thinned(period.clamp(PERIODS.0, PERIODS.1))).collect()
 }
 

@@ -225,10 +225,15 @@ impl<'a> Data<'a> {
         Some(residuals)
     }
 
-    /// Takes the pressure at the start for known no better than its readings tell; a model says what that does.
+    /// Takes the pressure at the start for known no better than its readings tell; a model says what that does. Behind a valve that is shut
+    /// it is never forgotten: there the readings are all that there is, and what they lose is a leak.
     pub fn doubt_starts(&mut self, parameters: &Parameters) {
         let Some(noise) = self.noise.get(&Signal::GaugePressure) else { return };
-        let deviation = |recording| start_deviation(recording, noise.level, noise.inflation).unwrap_or(0.0);
+        let deviation = |recording: &Recording| {
+            let is_forgotten = parameters.valve.bandwidth * recording.duration() > 1.0;
+            let told = is_forgotten.then(|| start_deviation(recording, noise.level, noise.inflation));
+            told.flatten().unwrap_or(0.0)
+        };
         let deviations: Vec<f64> = self.recordings.iter().map(deviation).collect();
         let off = |by: f64| {
             let shifted =
