@@ -268,6 +268,11 @@ fn moved(gauge_pressure: f64, contraction: f64, contraction_velocity: f64) -> Po
     Point { contraction_velocity, ..at_rest(gauge_pressure, contraction) }
 }
 
+/// Point of a hanging load at the start: at rest, or as slow as the effects have it start.
+fn at_start(parameters: &Parameters, gauge_pressure: f64, contraction: f64) -> Point {
+    moved(gauge_pressure, contraction, parameters.effects.start_velocity())
+}
+
 /// The point as the states of effects see it.
 #[inline]
 fn with_pull(parameters: &Parameters, at: &Point) -> Point {
@@ -308,8 +313,8 @@ pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
     if parameters.are_nominal() {
         return nominal;
     }
-    let velocity = parameters.effects.start_velocity();
-    let lack = |gauge_pressure: f64| weight - resting_pull(parameters, &moved(gauge_pressure, contraction, velocity));
+    let lack =
+        |gauge_pressure: f64| weight - resting_pull(parameters, &at_start(parameters, gauge_pressure, contraction));
     let highest = 2.0 * nominal + 5e5;
     if lack(0.0) <= 0.0 || lack(highest) > 0.0 { nominal } else { bisect(lack, 0.0, highest) }
 }
@@ -320,8 +325,8 @@ pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
 /// Among several it is the longest muscle whose stiffness is positive.
 pub fn equilibrium(parameters: &Parameters, gauge_pressure: f64, weight: f64) -> Option<f64> {
     let muscle = &parameters.muscle;
-    let velocity = parameters.effects.start_velocity();
-    let surplus = |contraction: f64| resting_pull(parameters, &moved(gauge_pressure, contraction, velocity)) - weight;
+    let surplus =
+        |contraction: f64| resting_pull(parameters, &at_start(parameters, gauge_pressure, contraction)) - weight;
     let samples = 300;
     let at = |k: i32| muscle.rest_length * (-0.2 + 0.7 * f64::from(k) / f64::from(samples));
     let bracket = (0..samples).find(|&k| surplus(at(k)) > 0.0 && surplus(at(k + 1)) <= 0.0)?;
@@ -372,9 +377,9 @@ impl System for PneumaticMuscle {
         let hanging = equilibrium(parameters, gauge_pressure, mass * GRAVITY + inputs.external_force);
         let contraction = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
         let mut state = [0.0; HANGING_STATES];
-        let velocity = parameters.effects.start_velocity();
-        state[..3].copy_from_slice(&[gauge_pressure, contraction, velocity]);
-        state[3..].copy_from_slice(&effects_at_start(parameters, &moved(gauge_pressure, contraction, velocity)));
+        let at = at_start(parameters, gauge_pressure, contraction);
+        state[..3].copy_from_slice(&[at.gauge_pressure, at.contraction, at.contraction_velocity]);
+        state[3..].copy_from_slice(&effects_at_start(parameters, &at));
         Ok(Extended(state))
     }
 

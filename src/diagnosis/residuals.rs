@@ -482,8 +482,7 @@ fn number(segments: &mut [Segment]) {
 
 /// Times from which recordings are held out: the end of each, so that every load and every regime is seen by the fits.
 fn last_part(recordings: &[Recording]) -> Vec<f64> {
-    let from = |time: &Vec<f64>| time[0] + TRAINING_SHARE * (time[time.len() - 1] - time[0]);
-    recordings.iter().map(|recording| from(&recording.time)).collect()
+    recordings.iter().map(|recording| recording.time[0] + TRAINING_SHARE * recording.duration()).collect()
 }
 
 fn mean_square(values: &[f64]) -> f64 {

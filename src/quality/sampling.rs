@@ -22,7 +22,7 @@ pub fn notes(recording: &Recording, parameters: &Parameters) -> Vec<String> {
     let intervals: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let Some(usual) = quantile(&intervals, 0.5) else { return Vec::new() };
     let mut notes = Vec::new();
-    let lasts = recording.time[recording.time.len() - 1] - recording.time[0];
+    let lasts = recording.duration();
     // A valve slower than the whole recording is shut.
     let valve_time =
         recording.get(Signal::Command).map(|_| 1.0 / parameters.valve.bandwidth).filter(|time| *time < lasts);
@@ -109,8 +109,7 @@ fn leaps(recording: &Recording) -> Option<String> {
 ///
 /// Within its time constant an exponential shows 63 % of itself; in less it cannot be told from a straight line.
 pub fn too_short(recordings: &[Recording]) -> Option<String> {
-    let lasts = |recording: &Recording| recording.time[recording.time.len() - 1] - recording.time[0];
-    let longest = recordings.iter().map(lasts).fold(0.0, f64::max);
+    let longest = recordings.iter().map(Recording::duration).fold(0.0, f64::max);
     slower_than(longest, &slow_effects())
 }
 
