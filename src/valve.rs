@@ -23,4 +23,9 @@ impl Valve {
     pub fn target_pressure(&self, command: f64) -> f64 {
         (self.gain * command).max(0.0)
     }
+
+    /// Whether it is shut for all that a recording of so many seconds can tell: slower than that lasts.
+    pub fn is_shut(&self, duration: f64) -> bool {
+        self.bandwidth * duration <= 1.0
+    }
 }

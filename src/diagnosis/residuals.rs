@@ -230,9 +230,8 @@ impl<'a> Data<'a> {
     pub fn doubt_starts(&mut self, parameters: &Parameters) {
         let Some(noise) = self.noise.get(&Signal::GaugePressure) else { return };
         let deviation = |recording: &Recording| {
-            let is_forgotten = parameters.valve.bandwidth * recording.duration() > 1.0;
-            let told = is_forgotten.then(|| start_deviation(recording, noise.level, noise.inflation));
-            told.flatten().unwrap_or(0.0)
+            let is_kept = parameters.valve.is_shut(recording.duration());
+            if is_kept { 0.0 } else { start_deviation(recording, noise.level, noise.inflation).unwrap_or(0.0) }
         };
         let deviations: Vec<f64> = self.recordings.iter().map(deviation).collect();
         let off = |by: f64| {
@@ -249,19 +248,16 @@ impl<'a> Data<'a> {
     /// C = 1 + c cᵀ; C^−½ e is white again.
     fn whiten(&self, recording: usize, residuals: &mut [f64]) {
         let of_recording = || self.segments.iter().filter(|segment| segment.recording == recording);
-        let (mut doubt, mut shared) = (0.0, 0.0);
-        for segment in of_recording() {
+        let weighted = of_recording().flat_map(|segment| {
             let noise = self.noise[&segment.signal];
             let weight = 1.0 / (noise.level.powi(2) * noise.inflation);
-            for at in segment.range.clone() {
-                doubt += weight * self.by_start[at].powi(2);
-                shared += weight * self.by_start[at] * residuals[at];
-            }
-        }
-        if doubt > 0.0 {
-            let share = (1.0 - 1.0 / (1.0 + doubt).sqrt()) / doubt * shared;
-            let all = of_recording().flat_map(|segment| segment.range.clone());
-            all.for_each(|at| residuals[at] -= share * self.by_start[at]);
+            let both = self.by_start[segment.range.clone()].iter().zip(&residuals[segment.range.clone()]);
+            both.map(move |(common, residual)| (weight, *common, *residual))
+        });
+        let share = share_to_whiten(weighted);
+        let all = of_recording().flat_map(|segment| segment.range.clone());
+        for at in all {
+            residuals[at] -= share * self.by_start[at];
         }
     }
 
@@ -454,6 +450,17 @@ impl<'a> Data<'a> {
     }
 }
 
+/// How much of what a common error does to residuals is to be taken off them, so that they are white again, given for each its weight (one
+/// over the variance of its noise), what one standard deviation of the common error does to it, and itself.
+fn share_to_whiten(residuals: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
+    let (mut doubt, mut shared) = (0.0, 0.0);
+    for (weight, common, residual) in residuals {
+        doubt += weight * common.powi(2);
+        shared += weight * common * residual;
+    }
+    if doubt > 0.0 { (1.0 - 1.0 / (1.0 + doubt).sqrt()) / doubt * shared } else { 0.0 }
+}
+
 /// The samples that can be compared: measured, changing, and an output of the simulation.
 fn segments(recordings: &[Recording], nominal: &Parameters) -> Result<Vec<Segment>> {
     let mut segments = Vec::new();
@@ -513,6 +520,22 @@ fn effective_samples(series: &[f64], period: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    #[test]
+    fn residuals_with_a_common_error_have_their_likelihood_once_white() {
+        // eᵀ C⁻¹ e with C = D + c cᵀ, D the variances of the noise: the sum of squares of the whitened residuals in units of the noise.
+        let deviation = DVector::from_fn(6, |k, _| 0.4 + 0.3 * k as f64);
+        let common = DVector::from_fn(6, |k, _| (1.7 * k as f64).sin());
+        let residuals = DVector::from_fn(6, |k, _| 2.0 * (0.9 * k as f64).cos());
+        let covariance = DMatrix::from_diagonal(&deviation.map(|d| d * d)) + &common * common.transpose();
+        let expected = residuals.dot(&covariance.lu().solve(&residuals).unwrap());
+
+        let weighted = (0..6).map(|k| (deviation[k].powi(-2), common[k], residuals[k]));
+        let white = &residuals - share_to_whiten(weighted) * &common;
+        assert!((white.component_div(&deviation).norm_squared() - expected).abs() < 1e-12 * expected);
+        assert_eq!(share_to_whiten([(1.0, 0.0, 2.0)].into_iter()), 0.0);
+    }
 
     #[test]
     fn neighbours_that_hang_together_are_worth_less() {

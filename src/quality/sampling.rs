@@ -22,10 +22,8 @@ pub fn notes(recording: &Recording, parameters: &Parameters) -> Vec<String> {
     let intervals: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let Some(usual) = quantile(&intervals, 0.5) else { return Vec::new() };
     let mut notes = Vec::new();
-    let lasts = recording.duration();
-    // A valve slower than the whole recording is shut.
-    let valve_time =
-        recording.get(Signal::Command).map(|_| 1.0 / parameters.valve.bandwidth).filter(|time| *time < lasts);
+    let drives = recording.get(Signal::Command).is_some() && !parameters.valve.is_shut(recording.duration());
+    let valve_time = drives.then(|| 1.0 / parameters.valve.bandwidth);
     // What is shorter than the valve's own time loses nothing.
     let longest_allowed = (GAP * usual).max(valve_time.unwrap_or(0.0));
     notes.extend(
