@@ -8,6 +8,8 @@ use crate::parameters::Parameters;
 use crate::variables::{Declared, Variable};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::collections::VecDeque;
+use std::sync::{Mutex, PoisonError};
 
 /// Corrections that every fit may make, in units of the declared tolerance of the nominal value: a muscle and its valve
 /// are never quite the preset. Damping is the least known coefficient, and other losses of a rig add to it.
@@ -47,6 +49,9 @@ const SCANS: [f64; 2] = [4e-3, 2e-4];
 /// Rounds of a fit that counts, and the relative gain of one below which it is the last.
 const MOST_ROUNDS: usize = 6;
 const SMALL_GAIN: f64 = 1e-3;
+
+/// Simulations that are kept: of the longest recordings they take 40 MB.
+const KEPT: usize = 128;
 
 /// A parameter as fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -359,6 +364,8 @@ pub struct Bench<'a> {
     /// At the baseline; empty before it is known.
     slopes: Slopes,
     weights: Vec<f64>,
+    /// Models that were simulated last, with what [`Data::residuals`] gives for them.
+    recent: Mutex<VecDeque<(Parameters, Vec<f64>)>>,
 }
 
 impl<'a> Bench<'a> {
@@ -366,13 +373,28 @@ impl<'a> Bench<'a> {
     pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64, off: Off) -> Self {
         let corrections = corrections(nominal, tolerance, off);
         let weights = data.weights(Scope::All);
-        Self { data, nominal, corrections, slopes: Vec::new(), weights }
+        Self { data, nominal, corrections, slopes: Vec::new(), weights, recent: Mutex::default() }
     }
 
     /// Takes what a better model shows of the noise.
     pub fn refine_noise(&mut self, residuals: &[f64]) {
         self.data.refine_noise(residuals);
         self.weights = self.data.weights(Scope::All);
+        self.recent = Mutex::default(); // the start is in doubt as the noise has it
+    }
+
+    /// [`Data::residuals`] of a model. A fit starts from where another one did or ended: one simulation in eight is known.
+    fn residuals(&self, model: &Parameters) -> Option<Vec<f64>> {
+        let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = recent().iter().find(|(known, _)| known == model).map(|(_, residuals)| residuals.clone());
+        if known.is_some() {
+            return known;
+        }
+        let residuals = self.data.residuals(model)?;
+        let mut recent = recent();
+        recent.truncate(KEPT - 1);
+        recent.push_front((*model, residuals.clone()));
+        Some(residuals)
     }
 
     /// Fits the corrections alone, and learns what each of them does to the residuals.
@@ -411,7 +433,7 @@ impl<'a> Bench<'a> {
         let mut best: Option<(Fitted, f64)> = None;
         for _ in 0..MOST_ROUNDS {
             let from = best.as_ref().map_or(*start, |(fitted, _)| fitted.parameters);
-            let slopes = self.slopes_at(&from, &self.data.residuals(&from)?);
+            let slopes = self.slopes_at(&from, &self.residuals(&from)?);
             let fitted = self.fit(hypothesis, &from, scope, &slopes, EXACT)?;
             let cost = cost(&fitted.residuals, &self.data.weights(scope));
             let before = best.as_ref().map_or(f64::INFINITY, |(_, cost)| *cost);
@@ -450,7 +472,7 @@ impl<'a> Bench<'a> {
     pub fn refined_start(&self, model: &Parameters, part: Part, known: &[&str]) -> Option<Parameters> {
         let new: Vec<_> = part.freed().filter(|(name, _)| !known.contains(name)).collect();
         let at = |choice: usize| at_start(model, new.iter().copied(), choice);
-        if !new.is_empty() && self.data.residuals(&at(0)) == self.data.residuals(model) {
+        if !new.is_empty() && self.residuals(&at(0)) == self.residuals(model) {
             return None;
         }
         let size = part.size();
@@ -482,7 +504,7 @@ impl<'a> Bench<'a> {
     /// Sums of squares that models leave, the least first, of equal ones the first; without those that cannot be simulated.
     fn ranked(&self, models: Vec<Parameters>) -> Vec<(f64, Parameters)> {
         let costs = models.into_par_iter().filter_map(|model| {
-            let cost = cost(&self.data.residuals(&model)?, &self.weights);
+            let cost = cost(&self.residuals(&model)?, &self.weights);
             Some((cost, model))
         });
         let mut ranked: Vec<_> = costs.collect();
@@ -500,22 +522,21 @@ impl<'a> Bench<'a> {
     ) -> Option<Fitted> {
         let (variables, free) = self.everything_free(hypothesis, start);
         let weights = self.data.weights(scope);
-        let residuals = |values: &[f64]| {
-            Some(weighted(&self.data.residuals(&with_values(self.nominal, &variables, values))?, &weights))
-        };
+        let residuals =
+            |values: &[f64]| Some(weighted(&self.residuals(&with_values(self.nominal, &variables, values))?, &weights));
         let known: Vec<Vec<f64>> = slopes.iter().map(|slope| weighted(slope, &weights)).collect();
         let fit = least_squares::fit(&residuals, &free, &known, effort);
         if fit.ended == Ended::NoStart {
             return None;
         }
         let parameters = with_values(self.nominal, &variables, &fit.parameters);
-        Some(self.fitted(hypothesis, parameters, self.data.residuals(&parameters)?))
+        Some(self.fitted(hypothesis, parameters, self.residuals(&parameters)?))
     }
 
     /// A fit with one of its effects at its neutral defaults and all else as it was; `None` where that cannot be simulated.
     pub fn neutralised(&self, fitted: &Fitted, effect: &Description) -> Option<Fitted> {
         let parameters = neutralised(&fitted.parameters, effect);
-        let residuals = self.data.residuals(&parameters)?;
+        let residuals = self.residuals(&parameters)?;
         Some(self.fitted(&fitted.hypothesis.without(effect.name), parameters, residuals))
     }
 
@@ -536,12 +557,7 @@ impl<'a> Bench<'a> {
     fn slopes_at(&self, model: &Parameters, residuals: &[f64]) -> Slopes {
         let (variables, free): (Vec<_>, Vec<_>) = self.corrections.iter().copied().unzip();
         let at: Vec<f64> = variables.iter().map(|variable| declared(model, variable.name).1).collect();
-        derivatives(
-            &|values: &[f64]| self.data.residuals(&with_values(model, &variables, values)),
-            &free,
-            &at,
-            residuals,
-        )
+        derivatives(&|values: &[f64]| self.residuals(&with_values(model, &variables, values)), &free, &at, residuals)
     }
 
     fn fitted(&self, hypothesis: &Hypothesis, parameters: Parameters, residuals: Vec<f64>) -> Fitted {
@@ -583,7 +599,7 @@ impl<'a> Bench<'a> {
     pub fn start(&self, base: &Fitted, part: Part, choice: usize) -> Option<Start> {
         let parameters = at_start(&base.parameters, part.freed(), choice);
         let change = |model: &Parameters| {
-            let changed = self.data.residuals(model)?;
+            let changed = self.residuals(model)?;
             let change = changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect::<Vec<_>>();
             Some(weighted(&change, &self.weights))
         };
@@ -619,8 +635,7 @@ impl<'a> Bench<'a> {
             kept.into_iter().chain([anew])
         });
         let (own, neutral) = at(&Parameters::default(), &new);
-        let acts =
-            |start: &Parameters| self.data.residuals(start) != self.data.residuals(&with_values(start, &own, &neutral));
+        let acts = |start: &Parameters| self.residuals(start) != self.residuals(&with_values(start, &own, &neutral));
         let mut ranked = self.ranked(starts.collect()).into_iter().map(|(_, start)| start);
         ranked.find(|start| own.is_empty() || acts(start))
     }
@@ -676,7 +691,7 @@ impl<'a> Bench<'a> {
         fitted: &Fitted,
         scope: Scope,
     ) -> Option<Vec<f64>> {
-        let residuals = |values: &[f64]| self.data.residuals(&with_values(self.nominal, variables, values));
+        let residuals = |values: &[f64]| self.residuals(&with_values(self.nominal, variables, values));
         let weights = self.data.weights(scope);
         let scaled = |(column, free): (Vec<f64>, &Free)| -> Vec<f64> {
             column.iter().zip(&weights).map(|(slope, weight)| slope * weight * free.typical).collect()
@@ -700,7 +715,7 @@ impl<'a> Bench<'a> {
         let variables = fitted.hypothesis.variables();
         let free = bounds(&variables, &fitted.parameters);
         let at: Vec<f64> = free.iter().map(|f| f.start).collect();
-        let residuals = |values: &[f64]| self.data.residuals(&with_values(&fitted.parameters, &variables, values));
+        let residuals = |values: &[f64]| self.residuals(&with_values(&fitted.parameters, &variables, values));
         let [seen, unseen] = [seen, seen.others()].map(|scope| self.data.weights(scope));
         let columns = derivatives(&residuals, &free, &at, &fitted.residuals);
         columns.iter().any(|column| cost(column, &seen) == 0.0 && cost(column, &unseen) > 0.0)
