@@ -30,10 +30,10 @@ use crate::{Error, Result};
 use candidates::{Bench, Fitted, Off, Part, recordings_for};
 use residuals::Data;
 use residuals::Scope;
-use selection::{Chosen, Judged, MOST_EFFECTS, Search};
+use selection::{Chosen, Judged, MOST_EFFECTS};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use ways::Found;
+use ways::{Found, Way};
 
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
@@ -163,24 +163,17 @@ pub fn diagnose(
     };
     let data = Data::new(recordings, nominal, tolerance)?;
     let thinned = thinned(recordings);
-    let mut found: Option<Found> = None;
-    for off in Off::ways(nominal) {
-        if found.as_ref().is_some_and(Found::finds_nothing) {
-            break;
-        }
+    let prepared = |off: &Off| {
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;
         for_fits.doubt_starts(nominal);
-        let mut bench = Bench::new(for_fits, nominal, tolerance, *off);
-        let baseline = baseline(&mut bench).ok_or_else(cannot_follow)?;
-        done("nominal");
-        let most = found.as_ref().map_or(MOST_EFFECTS, Found::most_beside);
-        let search = Search::new(&mut bench, baseline, most, *off == Off::most(nominal));
-        let chosen = search.run(done).ok_or_else(cannot_follow)?;
-        let next = Found { bench, chosen };
-        found = Some(found.filter(|found| found.beats(&next)).unwrap_or(next));
+        Way::new(Bench::new(for_fits, nominal, tolerance, *off), *off == Off::most(nominal)).ok_or_else(cannot_follow)
+    };
+    let Found { bench, chosen } = match Off::ways(nominal) {
+        [narrow, wide] => ways::better(prepared(narrow)?, || prepared(wide), done)?,
+        ways => prepared(&ways[0])?.searched(MOST_EFFECTS, done),
     }
-    let Found { bench, chosen } = found.ok_or_else(cannot_follow)?;
+    .ok_or_else(cannot_follow)?;
     answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
 }
 
@@ -188,13 +181,6 @@ pub fn diagnose(
 fn thinned(recordings: &[Recording]) -> Vec<Recording> {
     let period = recordings.iter().map(Recording::duration).sum::<f64>() / MANY_SAMPLES;
     recordings.iter().map(|recording| recording.thinned(period.clamp(PERIODS.0, PERIODS.1))).collect()
-}
-
-/// The nominal model with its corrections, and noise judged from it; `None` where it cannot be simulated.
-fn baseline(bench: &mut Bench) -> Option<Fitted> {
-    let first = bench.baseline()?;
-    bench.refine_noise(&first.residuals);
-    bench.baseline()
 }
 
 /// The choice in words and figures, its errors on all samples.

@@ -3,8 +3,62 @@
 
 use super::candidates::{Bench, Fitted};
 use super::residuals::Scope;
-use super::selection::evidence::odds;
-use super::selection::{Chosen, LEAST_EVIDENCE, MOST_EFFECTS};
+use super::selection::evidence::{is_unsound, odds};
+use super::selection::{Chosen, LEAST_EVIDENCE, MOST_EFFECTS, Search};
+use crate::Result;
+
+/// A way in which the coefficients of the nominal model may be off, before any effect is looked for.
+pub struct Way<'a> {
+    bench: Bench<'a>,
+    /// The nominal model with its corrections.
+    baseline: Fitted,
+    /// Whether no way allows more.
+    allows_most: bool,
+}
+
+impl<'a> Way<'a> {
+    /// Fits the nominal model with its corrections, which tell the noise; `None` where it cannot be simulated.
+    pub fn new(mut bench: Bench<'a>, allows_most: bool) -> Option<Self> {
+        let first = bench.baseline()?;
+        bench.refine_noise(&first.residuals);
+        let baseline = bench.baseline()?;
+        Some(Self { bench, baseline, allows_most })
+    }
+
+    /// Whether no more is left than a sound model may leave.
+    fn says_all(&self) -> bool {
+        !is_unsound(&self.baseline.losses, &self.bench.data)
+    }
+
+    /// Looks for at most so many effects; `done` is told after the nominal model and each candidate. `None` where a model cannot be simulated.
+    pub fn searched(mut self, most: usize, done: &(dyn Fn(&str) + Sync)) -> Option<Found<'a>> {
+        done("nominal");
+        let chosen = Search::new(&mut self.bench, self.baseline, most, self.allows_most).run(done)?;
+        Some(Found { bench: self.bench, chosen })
+    }
+}
+
+/// What was found in the better one of two ways, of which the second allows more and is prepared where it is needed; `None` where a model
+/// cannot be simulated.
+///
+/// # Errors
+/// Those of preparing the second one.
+pub fn better<'a>(
+    narrow: Way<'a>,
+    wide: impl Fn() -> Result<Way<'a>>,
+    done: &(dyn Fn(&str) + Sync),
+) -> Result<Option<Found<'a>>> {
+    let at_once = if narrow.says_all() { None } else { Some(wide()?) };
+    // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
+    let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
+    let Some(found) = narrow.searched(most, done) else { return Ok(None) };
+    if found.finds_nothing() {
+        return Ok(Some(found));
+    }
+    let wide = at_once.map_or_else(wide, Ok)?;
+    let next = wide.searched(found.most_beside(), done);
+    Ok(next.map(|next| if found.beats(&next) { found } else { next }))
+}
 
 /// What was found where the coefficients of the nominal model may be off in one way.
 pub struct Found<'a> {

@@ -108,9 +108,7 @@ impl Effect for EndEffects {
         } else {
             format!(", for the membrane {:.2} times", 1.0 + self.elastic_share * (at_two_bar - 1.0))
         };
-        format!(
-            "The ends of the muscle contract less than its middle: at 2 bar the contraction counts {at_two_bar:.2} \
-             times{membrane}."
-        )
+        let word = if at_two_bar < 1.0 { "more than nominal" } else { "less than its middle" };
+        format!("The ends of the muscle contract {word}: at 2 bar the contraction counts {at_two_bar:.2} times{membrane}.")
     }
 }
