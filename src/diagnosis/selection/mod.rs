@@ -239,11 +239,8 @@ impl<'a, 'b> Search<'a, 'b> {
         if worth > 0.0 { 1.0 - still / worth } else { 0.0 }
     }
 
-    /// The most promising hypotheses with one effect more than those of a level, the best first.
-    ///
-    /// Of the best, effects are exchanged for others. Where it leaves more than forms may, the earlier ones are, beside what the rest
-    /// is without them: alone, a wrong one may have looked better. Where it does not, and is worth one effect more, all are, beside
-    /// what the rest is with them: what does the same there may not have been found from elsewhere.
+    /// The most promising hypotheses with one effect more than those of a level, the best first. Of the best, effects are exchanged for
+    /// others until no other one becomes the best by that.
     fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
         let mut bases = carried_on(level);
         // What forms may leave is looked into only where the best leaves it.
@@ -252,7 +249,26 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         let more = bases.into_iter().flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, starts)).collect();
         let mut next = self.worth_refining(level, more);
-        let Some(best) = possible(&next).or(next.first()) else { return next };
+        let mut exchanged_in: Vec<Vec<&str>> = Vec::new();
+        while let Some(best) = possible(&next).or(next.first()) {
+            let names = best.fitted.hypothesis.names();
+            if exchanged_in.contains(&names) {
+                break;
+            }
+            let others = self.exchanged(level, &next, best, starts);
+            next.extend(others);
+            next = each_once(next);
+            exchanged_in.push(names);
+        }
+        self.rivals_in_best_form(next)
+    }
+
+    /// Hypotheses with effects of the best exchanged for others, those that are `known` to be as good in another form left out.
+    ///
+    /// Where the best leaves more than forms may, the earlier effects are exchanged, beside what the rest is without them: alone, a wrong one
+    /// may have looked better. Where it does not, and is worth one effect more than a level has, all are, beside what the rest is with
+    /// them: what does the same there may not have been found from elsewhere.
+    fn exchanged(&self, level: &[Judged], known: &[Judged], best: &Judged, starts: &[(Part, usize)]) -> Vec<Judged> {
         let parts = &best.fitted.hypothesis.parts;
         let without: Vec<(&Part, Fitted)> = if !self.may_be_form(&best.fitted.losses) {
             let earlier = parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
@@ -267,9 +283,8 @@ impl<'a, 'b> Search<'a, 'b> {
             self.extend(base, false, &others.collect::<Vec<_>>())
         };
         let mut exchanged: Vec<Judged> = without.iter().flat_map(exchange).collect();
-        exchanged.retain(|judged| !next.iter().any(|known| same_effects(known, judged) && known.score >= judged.score));
-        next.extend(self.worth_refining(level, exchanged));
-        self.rivals_in_best_form(each_once(next))
+        exchanged.retain(|other| !known.iter().any(|known| same_effects(known, other) && known.score >= other.score));
+        self.worth_refining(level, exchanged)
     }
 
     /// Of hypotheses those that may be worth more effects than a level has, each once, refined, the best first.
