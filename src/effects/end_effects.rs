@@ -109,6 +109,8 @@ impl Effect for EndEffects {
             format!(", for the membrane {:.2} times", 1.0 + self.elastic_share * (at_two_bar - 1.0))
         };
         let word = if at_two_bar < 1.0 { "more than nominal" } else { "less than its middle" };
-        format!("The ends of the muscle contract {word}: at 2 bar the contraction counts {at_two_bar:.2} times{membrane}.")
+        format!(
+            "The ends of the muscle contract {word}: at 2 bar the contraction counts {at_two_bar:.2} times{membrane}."
+        )
     }
 }
