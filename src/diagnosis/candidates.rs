@@ -1,6 +1,7 @@
 //! Hypotheses: the nominal model with its small corrections and the parameters of some effects set free; and their fits.
 
 use super::residuals::{Data, Loss, Scope};
+use super::unlisted::Unlisted;
 use crate::effects::{Description, Freed};
 use crate::least_squares::{self, Effort, Ended, Free, derivatives, linear_decrease, normal_matrix};
 use crate::muscle::ForceModelName;
@@ -49,6 +50,9 @@ const SCANS: [f64; 2] = [4e-3, 2e-4];
 /// Rounds of a fit that counts, and the relative gain of one below which it is the last.
 const MOST_ROUNDS: usize = 6;
 const SMALL_GAIN: f64 = 1e-3;
+
+/// An error of a reading is no more than so many times what a fit leaves.
+const MANY_TIMES: f64 = 100.0;
 
 /// Simulations that are kept: of the longest recordings they take 40 MB.
 const KEPT: usize = 128;
@@ -176,33 +180,35 @@ fn at_start<'f>(model: &Parameters, freed: impl Iterator<Item = &'f Freed>, choi
     })
 }
 
-/// The nominal model with its corrections and some effects at work.
+/// The nominal model with its corrections and some effects at work, or with a cause that is in no library beside it.
 #[derive(Debug, Clone, Default)]
 pub struct Hypothesis {
     /// The effects.
     pub parts: Vec<Part>,
+    /// What is beside the model: [`Bench::fit_beside`] alone fits that.
+    pub beside: Option<Unlisted>,
 }
 
 impl Hypothesis {
     /// With one effect more.
     pub fn with(&self, part: Part) -> Self {
-        Self { parts: self.parts.iter().copied().chain([part]).collect() }
+        Self { parts: self.parts.iter().copied().chain([part]).collect(), ..*self }
     }
 
     /// With one effect less.
     pub fn without(&self, effect: &str) -> Self {
-        Self { parts: self.parts.iter().copied().filter(|part| part.effect.name != effect).collect() }
+        Self { parts: self.parts.iter().copied().filter(|part| part.effect.name != effect).collect(), ..*self }
     }
 
     /// With one of its effects in the form of another part.
     pub fn in_form_of(&self, other: Part) -> Self {
         let exchanged = |part: &Part| if part.effect.name == other.effect.name { other } else { *part };
-        Self { parts: self.parts.iter().map(exchanged).collect() }
+        Self { parts: self.parts.iter().map(exchanged).collect(), ..*self }
     }
 
     /// With only those of its refinements whose parameters are wanted.
     fn refined_as(&self, is_wanted: impl Fn(&str) -> bool) -> Self {
-        Self { parts: self.parts.iter().map(|part| part.refined_as(&is_wanted)).collect() }
+        Self { parts: self.parts.iter().map(|part| part.refined_as(&is_wanted)).collect(), ..*self }
     }
 
     /// Whether any refinement is free.
@@ -247,9 +253,14 @@ impl Hypothesis {
         self.parts.iter().any(|part| !parameters.effects.is_plausible(part.effect.name) || is_too_large(part))
     }
 
-    /// How many parameters the effects have.
+    /// How many causes there are.
+    pub fn causes(&self) -> usize {
+        self.parts.len() + usize::from(self.beside.is_some())
+    }
+
+    /// How many parameters the causes have.
     pub fn size(&self) -> usize {
-        self.freed().count()
+        self.freed().count() + self.beside.map_or(0, Unlisted::parameters)
     }
 }
 
@@ -533,6 +544,42 @@ impl<'a> Bench<'a> {
         Some(self.fitted(hypothesis, parameters, self.residuals(&parameters)?))
     }
 
+    /// The baseline with a cause beside it that is in no library, given what one of size one adds to the residuals; fitted to the samples in
+    /// scope. `None` where it adds nothing.
+    pub fn fit_beside(&self, baseline: &Fitted, cause: Unlisted, course: &[f64], scope: Scope) -> Option<Fitted> {
+        let course = self.as_large(course, baseline)?;
+        let (variables, mut free) = self.everything_free(&baseline.hypothesis, &baseline.parameters);
+        free.insert(0, Free { start: 0.0, lower: -MANY_TIMES, upper: MANY_TIMES, typical: 1.0, prior: None });
+        let beside = |values: &[f64]| {
+            let residuals = self.residuals(&with_values(self.nominal, &variables, &values[1..]))?;
+            Some(residuals.iter().zip(&course).map(|(residual, by)| residual - values[0] * by).collect::<Vec<_>>())
+        };
+        let weights = self.data.weights(scope);
+        let taken_off: Vec<f64> = course.iter().map(|by| -by).collect();
+        let known: Vec<Vec<f64>> =
+            [&taken_off].into_iter().chain(&self.slopes).map(|slope| weighted(slope, &weights)).collect();
+        let fit =
+            least_squares::fit(&|values: &[f64]| Some(weighted(&beside(values)?, &weights)), &free, &known, EXACT);
+        if fit.ended == Ended::NoStart {
+            return None;
+        }
+        let parameters = with_values(self.nominal, &variables, &fit.parameters[1..]);
+        let hypothesis = Hypothesis { beside: Some(cause), ..baseline.hypothesis.clone() };
+        Some(self.fitted(&hypothesis, parameters, beside(&fit.parameters)?))
+    }
+
+    /// Share of the squares that may go away with an error of readings that has a course of its own, as for starts of effects.
+    pub fn promise_of_course(&self, base: &Fitted, course: &[f64]) -> f64 {
+        self.as_large(course, base).map_or(0.0, |course| self.promise(base, vec![weighted(&course, &self.weights)]))
+    }
+
+    /// A course with as large squares as a fit leaves; `None` where it is zero.
+    fn as_large(&self, course: &[f64], fitted: &Fitted) -> Option<Vec<f64>> {
+        let [own, wanted] = [course, &fitted.residuals].map(|values| cost(values, &self.weights));
+        let scale = (wanted / own).sqrt();
+        (scale.is_finite() && scale > 0.0).then(|| course.iter().map(|value| scale * value).collect())
+    }
+
     /// A fit with one of its effects at its neutral defaults and all else as it was; `None` where that cannot be simulated.
     pub fn neutralised(&self, fitted: &Fitted, effect: &Description) -> Option<Fitted> {
         let parameters = neutralised(&fitted.parameters, effect);
@@ -544,7 +591,9 @@ impl<'a> Bench<'a> {
     /// them than that (Laplace's approximation of the evidence, D. MacKay 1992, doi 10.1162/neco.1992.4.3.415).
     pub fn price(&self, fitted: &Fitted) -> f64 {
         let weights = self.data.weights_beside_structure();
-        let slopes = self.slopes_at(&fitted.parameters, &fitted.residuals);
+        // What is beside a model is no part of its residuals.
+        let residuals = self.residuals(&fitted.parameters).unwrap_or_else(|| fitted.residuals.clone());
+        let slopes = self.slopes_at(&fitted.parameters, &residuals);
         let expected = self.corrections.iter().zip(slopes).filter_map(|((variable, correction), slope)| {
             let (mean, deviation) = correction.prior?;
             let off = (declared(&fitted.parameters, variable.name).1 - mean) / deviation;

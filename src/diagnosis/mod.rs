@@ -15,6 +15,7 @@ mod remaining;
 pub mod report;
 mod residuals;
 mod selection;
+mod unlisted;
 mod ways;
 
 pub use candidates::FittedParameter;
@@ -33,6 +34,7 @@ use residuals::Scope;
 use selection::{Chosen, Judged, MOST_EFFECTS};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use unlisted::Shown;
 use ways::{Found, Way};
 
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
@@ -240,8 +242,18 @@ fn answer(
         extended,
         corrections,
         notes,
-        remaining: remaining::remaining(&data, &extended, &left),
+        remaining: unlisted(bench, chosen).into_iter().chain(remaining::remaining(&data, &extended, &left)).collect(),
     })
+}
+
+/// What the error goes with as a cause in no library would have it.
+fn unlisted(bench: &Bench, chosen: &Chosen) -> Option<Remaining> {
+    let cause = chosen.best.hypothesis.beside?;
+    let course = Shown::beside(&bench.data, &chosen.model.parameters)?.by(cause)?;
+    let with = bench.fit_beside(&chosen.model, cause, &course, Scope::Training)?;
+    let signal = cause.signal();
+    let [before, after] = [&chosen.model, &with].map(|fitted| bench.data.held_out_rms(&fitted.residuals)[&signal]);
+    Some(Remaining { signal, on: cause.on().to_owned(), share: (1.0 - (after / before).powi(2)).max(0.0) })
 }
 
 /// How to simulate another recording than the first with causes that have values of their own there.

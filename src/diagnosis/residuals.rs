@@ -375,6 +375,19 @@ impl<'a> Data<'a> {
         })
     }
 
+    /// Values at the samples of each recording as an error of one reading, per residual in SI; `None` where they are not known or the reading
+    /// is not compared.
+    pub fn at_residuals(&self, signal: Signal, values: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
+        let mut all = vec![0.0; self.count()];
+        let mut of_signal = self.segments.iter().filter(|segment| segment.signal == signal).peekable();
+        of_signal.peek()?;
+        for segment in of_signal {
+            let values = values[segment.recording].as_ref()?;
+            segment.samples.iter().zip(segment.range.clone()).for_each(|(&k, at)| all[at] = values[k]);
+        }
+        Some(all)
+    }
+
     /// Whether a course over the time in s since the start cannot be told from what drives the muscle: in every recording the
     /// command, or the pressure where that is not there, has most of its variance in common with it.
     pub fn goes_with_inputs(&self, course: impl Fn(f64) -> f64) -> bool {

@@ -84,7 +84,7 @@ impl Found<'_> {
         }
     }
 
-    /// Whether causes are named here that are better than what was found where the coefficients may be off in a way that allows more. Each
+    /// Whether causes are found here that are better than what was found where the coefficients may be off in a way that allows more. Each
     /// cause more must be worth it, and against coefficients alone they must show.
     pub fn beats(&self, other: &Self) -> bool {
         let more = self.causes() as f64 - other.causes() as f64;
@@ -92,8 +92,9 @@ impl Found<'_> {
         self.causes() > 0 && may_be && self.odds_against(other) > LEAST_EVIDENCE * more
     }
 
+    /// How many causes were found, one in no library among them.
     fn causes(&self) -> usize {
-        self.chosen.model.hypothesis.parts.len()
+        self.chosen.best.hypothesis.causes()
     }
 
     /// Logarithm of the odds for the best fit here against the other one; the likelihoods are those of the other one's data.

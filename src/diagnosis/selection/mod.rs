@@ -2,6 +2,7 @@
 
 pub mod evidence;
 mod forms;
+mod makeshift;
 mod naming;
 
 use super::Verdict;
@@ -64,7 +65,7 @@ pub struct Chosen {
     pub model: Fitted,
     /// Whether that fit saw all samples, since the first ones tell too little.
     pub saw_all: bool,
-    /// The best fit to all samples; that of the baseline where no cause is named.
+    /// The best fit to all samples, of causes in the library or of one that is in none; that of the baseline where there is no cause.
     pub best: Fitted,
     /// What the baseline leaves.
     without: Vec<Loss>,
@@ -85,7 +86,7 @@ impl Chosen {
     /// Whether the best fit to all samples leaves no more than a sound model may and, of several causes, their forms.
     pub fn says_all(&self, data: &Data) -> bool {
         let before = beyond_noise(&self.without);
-        let has_several = self.model.hypothesis.parts.len() > 1;
+        let has_several = self.best.hypothesis.causes() > 1;
         let of_form = |signal| if has_several { left_by_form(before[&signal]) } else { 0.0 };
         leaves_at_most(&self.best.losses, |signal| left_by_structure(signal, data).max(of_form(signal)))
     }
@@ -104,13 +105,15 @@ pub struct Search<'a, 'b> {
     most: usize,
     /// Whether what the form of one cause may leave is worth a second one.
     minds_form: bool,
+    /// The best cause that is in no library.
+    unlisted: Option<Judged>,
 }
 
 impl<'a, 'b> Search<'a, 'b> {
     /// A search from a baseline for at most so many effects. Where another search lets the coefficients be off in a way that allows more, what
     /// the form of a cause may leave is that one's to explain: else coefficients that are off come out as a second cause.
     pub fn new(bench: &'b mut Bench<'a>, baseline: Fitted, most: usize, minds_form: bool) -> Self {
-        Self { bench, baseline, most, minds_form }
+        Self { bench, baseline, most, minds_form, unlisted: None }
     }
 
     fn judge(&self, fitted: Fitted) -> Judged {
@@ -130,6 +133,7 @@ impl<'a, 'b> Search<'a, 'b> {
             singles = self.judged_anew(singles);
         }
         let singles = if self.may_show() { self.refined_best(singles) } else { singles };
+        self.unlisted = if self.is_sound(&self.baseline.losses) { None } else { self.best_unlisted() };
         self.go_on(vec![singles.clone()], singles, &from)
     }
 
@@ -209,7 +213,7 @@ impl<'a, 'b> Search<'a, 'b> {
             Some(best) => best.fitted.hypothesis.parts.len() == now && asks_for_more(best),
             None => now == 1,
         };
-        now < self.most && is_worth && !self.is_sound(&self.baseline.losses)
+        now < self.most && is_worth && !self.is_sound(&self.baseline.losses) && !self.unlisted_says_all(levels)
     }
 
     /// Whether residuals are small enough to be those of forms, which are never known exactly.

@@ -29,11 +29,11 @@ const SPARED: f64 = 1.92;
 
 impl Search<'_, '_> {
     pub(super) fn choose(&self, levels: &[Vec<Judged>], singles: Vec<Judged>) -> Option<Chosen> {
-        let refused = |verdict| {
+        let refused = |verdict, best: &Fitted| {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
             Some(Chosen {
                 verdict,
-                best: self.baseline.clone(),
+                best: best.clone(),
                 without: self.baseline.losses.clone(),
                 model,
                 saw_all: false,
@@ -42,17 +42,23 @@ impl Search<'_, '_> {
                 singles: singles.clone(),
             })
         };
-        let wrong = if self.is_sound(&self.baseline.losses) { Verdict::Nominal } else { Verdict::Unexplained };
-        let Some(best) = self.leading(levels).map(|best| self.pruned(best.clone())) else { return refused(wrong) };
-        if best.explained < least_explained(&best.fitted).0 || is_better_if_impossible(levels, &best) {
-            return refused(wrong);
+        // What there is where nothing can be named.
+        let else_there = || match &self.unlisted {
+            Some(unlisted) => refused(Verdict::Unexplained, &unlisted.fitted),
+            None if self.is_sound(&self.baseline.losses) => refused(Verdict::Nominal, &self.baseline),
+            None => refused(Verdict::Unexplained, &self.baseline),
+        };
+        let Some(best) = self.leading(levels).map(|best| self.pruned(best.clone())) else { return else_there() };
+        let is_makeshift = is_better_if_impossible(levels, &best) || self.unlisted_instead_of(&best).is_some();
+        if best.explained < least_explained(&best.fitted).0 || is_makeshift {
+            return else_there();
         }
         let plain = self.simplest(&best);
         let size = plain.fitted.hypothesis.size();
         let told = self.without_idle(plain.clone());
         let are_idle = told.fitted.hypothesis.size() < size;
         let foretold = self.foretelling(told).or_else(|| if are_idle { self.foretelling(plain) } else { None });
-        let Some((model, holds_out)) = foretold else { return refused(wrong) };
+        let Some((model, holds_out)) = foretold else { return else_there() };
         let of_as_many = levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
         let rivals = self.rivals(&best, size, of_as_many.map_or(&[], |level| level));
         let alternatives: Vec<Vec<&'static str>> =

@@ -1,0 +1,57 @@
+//! Causes that are in no library: where one of them explains the data far better than effects of the library do, these are makeshifts.
+
+use super::evidence::{evidence, is_unsound};
+use super::{Judged, LEAST_EVIDENCE, Search};
+use crate::diagnosis::residuals::Scope;
+use crate::diagnosis::selection::naming::LEAST_EXPLAINED;
+use crate::diagnosis::unlisted::{Shown, Unlisted};
+use rayon::prelude::*;
+
+impl Search<'_, '_> {
+    /// The best of them that is worth a word: it shows, with the odds and the share of the error that an effect needs to be named.
+    pub(super) fn best_unlisted(&self) -> Option<Judged> {
+        let shown = Shown::beside(&self.bench.data, &self.baseline.parameters)?;
+        let mut each: Vec<Unlisted> = Vec::new();
+        for cause in self.most_promising(&shown, Unlisted::all()) {
+            if !each.iter().any(|known| known.is_like(cause)) {
+                each.push(cause);
+            }
+        }
+        let fits = each.into_iter().filter_map(|cause| {
+            let best = self.most_promising(&shown, cause.nearby()).into_iter().next()?;
+            Some(self.judge(self.bench.fit_beside(&self.baseline, best, &shown.by(best)?, Scope::All)?))
+        });
+        let explain = fits.filter(|fit| {
+            fit.evidence > LEAST_EVIDENCE
+                && fit.explained > LEAST_EXPLAINED.0
+                && self.shows(&self.baseline.losses, &fit.fitted.losses)
+        });
+        explain.max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+
+    /// Causes that may take something off the error, the most promising first.
+    fn most_promising(&self, shown: &Shown, causes: Vec<Unlisted>) -> Vec<Unlisted> {
+        let promises = causes.into_par_iter().filter_map(|cause| {
+            let promise = self.bench.promise_of_course(&self.baseline, &shown.by(cause)?);
+            (promise > 0.0).then_some((cause, promise))
+        });
+        let mut promising: Vec<(Unlisted, f64)> = promises.collect();
+        promising.sort_by(|a, b| b.1.total_cmp(&a.1));
+        promising.into_iter().map(|(cause, _)| cause).collect()
+    }
+
+    /// The cause in no library that has the odds against a hypothesis, if there is one.
+    pub(super) fn unlisted_instead_of(&self, best: &Judged) -> Option<&Judged> {
+        self.unlisted.as_ref().filter(|unlisted| evidence(&best.fitted, &unlisted.fitted) > LEAST_EVIDENCE)
+    }
+
+    /// Whether such a cause leaves no more than a sound model may, where nothing does that has fewer causes than are looked for next.
+    pub(super) fn unlisted_says_all(&self, levels: &[Vec<Judged>]) -> bool {
+        let says_all = |unlisted: &Judged| !is_unsound(&unlisted.fitted.losses, &self.bench.data);
+        let instead = match self.leading(levels) {
+            Some(best) => self.unlisted_instead_of(best),
+            None => self.unlisted.as_ref(),
+        };
+        instead.is_some_and(says_all)
+    }
+}
