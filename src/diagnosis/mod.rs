@@ -253,7 +253,8 @@ fn unlisted(bench: &Bench, chosen: &Chosen) -> Option<Remaining> {
     let with = bench.fit_beside(&chosen.model, cause, &course, Scope::Training)?;
     let signal = cause.signal();
     let [before, after] = [&chosen.model, &with].map(|fitted| bench.data.held_out_rms(&fitted.residuals)[&signal]);
-    Some(Remaining { signal, on: cause.on().to_owned(), share: (1.0 - (after / before).powi(2)).max(0.0) })
+    let share = (1.0 - (after / before).powi(2)).max(0.0);
+    Some(Remaining { signal, on: cause.on().to_owned(), share, is_known: true })
 }
 
 /// How to simulate another recording than the first with causes that have values of their own there.

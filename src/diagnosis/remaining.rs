@@ -14,6 +14,8 @@ pub struct Remaining {
     pub on: String,
     /// Share of its mean square on samples that no fit saw.
     pub share: f64,
+    /// Whether that is how a cause shows that is in no library, but known.
+    pub is_known: bool,
 }
 
 /// Least share that is worth a word.
@@ -58,7 +60,7 @@ fn most_telling(data: &Data, signal: Signal, residuals: &[f64], replays: &[Optio
     let pair = pairs.max_by(|a, b| a.1.total_cmp(&b.1));
     let (which, share) = pair.filter(|pair| pair.1 > best.1 + LEAST_ADDED).unwrap_or(best);
     let names: Vec<&str> = which.iter().map(|k| variables[*k].name).collect();
-    (share >= LEAST_SHARE).then(|| Remaining { signal, on: names.join(" and "), share })
+    (share >= LEAST_SHARE).then(|| Remaining { signal, on: names.join(" and "), share, is_known: false })
 }
 
 /// The quantities at the samples: measured where they were, else simulated.

@@ -39,8 +39,12 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
         Verdict::Ambiguous => format!("{named} This data cannot tell it from other causes, named below."),
         Verdict::Unexplained => {
             let unknown = "Something is wrong that no effect in the library accounts for: the cause is unknown.";
+            let looks_like = diagnosis.remaining.iter().find(|left| left.is_known).map(|left| {
+                let (share, signal) = (100.0 * left.share, left.signal.name().replace('_', " "));
+                format!("Of the error of the {signal} {share:.0} % goes with {}.", left.on)
+            });
             let correction = diagnosis.correction.as_ref().map(Correction::sentence);
-            [unknown.to_owned()].into_iter().chain(correction).collect::<Vec<_>>().join(" ")
+            [unknown.to_owned()].into_iter().chain(looks_like).chain(correction).collect::<Vec<_>>().join(" ")
         }
     }
 }

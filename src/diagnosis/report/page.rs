@@ -271,7 +271,12 @@ mod tests {
             extended: Parameters::default(),
             corrections: vec![correction],
             notes: vec!["<b>bold</b>".to_owned()],
-            remaining: vec![Remaining { signal: Signal::Force, on: "speed & pressure".to_owned(), share: 0.43 }],
+            remaining: vec![Remaining {
+                signal: Signal::Force,
+                on: "speed & pressure".to_owned(),
+                share: 0.43,
+                is_known: false,
+            }],
         }
     }
 
