@@ -4,7 +4,7 @@
 //! The nominal model is first allowed to be a little off (areas, elastic force and damping within the declared tolerance).
 //! What error then remains is compared, on samples that no fit saw, with the error that remains when one effect more is
 //! freed. An effect is named when it explains a good part of the error beyond doubt; otherwise the answer is that
-//! nothing is wrong, or that the cause is unknown.
+//! nothing is wrong, or that the cause is unknown; so it is where a cause that is in no library explains far more (`unlisted`).
 
 mod candidates;
 mod correction;
