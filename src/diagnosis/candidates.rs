@@ -547,9 +547,12 @@ impl<'a> Bench<'a> {
     /// The baseline with a cause beside it that is in no library, given what one of size one adds to the residuals; fitted to the samples in
     /// scope. `None` where it adds nothing.
     pub fn fit_beside(&self, baseline: &Fitted, cause: Unlisted, course: &[f64], scope: Scope) -> Option<Fitted> {
-        let course = self.as_large(course, baseline)?;
+        let scale = self.scale(course, baseline)?;
+        let course: Vec<f64> = course.iter().map(|value| scale * value).collect();
+        let (smallest, largest) = cause.sizes();
         let (variables, mut free) = self.everything_free(&baseline.hypothesis, &baseline.parameters);
-        free.insert(0, Free { start: 0.0, lower: -MANY_TIMES, upper: MANY_TIMES, typical: 1.0, prior: None });
+        let (lower, upper) = ((smallest / scale).max(-MANY_TIMES), (largest / scale).min(MANY_TIMES));
+        free.insert(0, Free { start: 0.0, lower, upper, typical: 1.0, prior: None });
         let beside = |values: &[f64]| {
             let residuals = self.residuals(&with_values(self.nominal, &variables, &values[1..]))?;
             Some(residuals.iter().zip(&course).map(|(residual, by)| residual - values[0] * by).collect::<Vec<_>>())
@@ -570,14 +573,16 @@ impl<'a> Bench<'a> {
 
     /// Share of the squares that may go away with an error of readings that has a course of its own, as for starts of effects.
     pub fn promise_of_course(&self, base: &Fitted, course: &[f64]) -> f64 {
-        self.as_large(course, base).map_or(0.0, |course| self.promise(base, vec![weighted(&course, &self.weights)]))
+        let Some(scale) = self.scale(course, base) else { return 0.0 };
+        let course: Vec<f64> = course.iter().map(|value| scale * value).collect();
+        self.promise(base, vec![weighted(&course, &self.weights)])
     }
 
-    /// A course with as large squares as a fit leaves; `None` where it is zero.
-    fn as_large(&self, course: &[f64], fitted: &Fitted) -> Option<Vec<f64>> {
+    /// By how much a course must be larger to have as large squares as a fit leaves; `None` where it is zero.
+    fn scale(&self, course: &[f64], fitted: &Fitted) -> Option<f64> {
         let [own, wanted] = [course, &fitted.residuals].map(|values| cost(values, &self.weights));
         let scale = (wanted / own).sqrt();
-        (scale.is_finite() && scale > 0.0).then(|| course.iter().map(|value| scale * value).collect())
+        (scale.is_finite() && scale > 0.0).then_some(scale)
     }
 
     /// A fit with one of its effects at its neutral defaults and all else as it was; `None` where that cannot be simulated.

@@ -219,10 +219,14 @@ impl<'a> Data<'a> {
     /// simulated. What the pressure at the start does to them counts less, the more it is in doubt.
     pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         let mut residuals = self.residuals_on(self.recordings, 1, parameters)?;
-        if !self.by_start.is_empty() {
-            (0..self.recordings.len()).for_each(|recording| self.whiten(recording, &mut residuals));
-        }
+        self.whiten_all(&mut residuals);
         Some(residuals)
+    }
+
+    fn whiten_all(&self, residuals: &mut [f64]) {
+        if !self.by_start.is_empty() {
+            (0..self.recordings.len()).for_each(|recording| self.whiten(recording, residuals));
+        }
     }
 
     /// Takes the pressure at the start for known no better than its readings tell; a model says what that does. Behind a valve that is shut
@@ -385,6 +389,7 @@ impl<'a> Data<'a> {
             let values = values[segment.recording].as_ref()?;
             segment.samples.iter().zip(segment.range.clone()).for_each(|(&k, at)| all[at] = values[k]);
         }
+        self.whiten_all(&mut all);
         Some(all)
     }
 

@@ -72,6 +72,11 @@ impl Unlisted {
         if let Self::CrossTalk(signal) = self { signal } else { Signal::Contraction }
     }
 
+    /// Smallest and largest size: no wheel gains way, or loses more than all.
+    pub fn sizes(self) -> (f64, f64) {
+        if matches!(self, Self::Slip { .. }) { (0.0, 1.0) } else { (f64::NEG_INFINITY, f64::INFINITY) }
+    }
+
     /// How many parameters it has, its size among them.
     pub fn parameters(self) -> usize {
         match self {
@@ -100,7 +105,7 @@ impl Unlisted {
             Self::Slip { direction, speed } => {
                 let velocity = slopes(time, simulated.get(Signal::Contraction)?);
                 let slips = |v: f64| v.abs() > speed && v * direction >= 0.0;
-                let lost = velocity.iter().map(|v| if slips(*v) { *v } else { 0.0 });
+                let lost = velocity.iter().map(|v| if slips(*v) { -*v } else { 0.0 });
                 Some(integral(time, &lost.collect::<Vec<_>>()))
             }
             Self::Rocking { frequency, damping } => {

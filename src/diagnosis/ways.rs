@@ -85,11 +85,21 @@ impl Found<'_> {
     }
 
     /// Whether causes are found here that are better than what was found where the coefficients may be off in a way that allows more. Each
-    /// cause more must be worth it, and against coefficients alone they must show.
+    /// cause more must be worth it, and against coefficients alone they must show. A cause in no library must be worth it against one
+    /// that has a name, and is none against coefficients that say all.
     pub fn beats(&self, other: &Self) -> bool {
         let more = self.causes() as f64 - other.causes() as f64;
-        let may_be = other.causes() > 0 || self.chosen.shows_beside_coefficients(&self.bench.data);
-        self.causes() > 0 && may_be && self.odds_against(other) > LEAST_EVIDENCE * more
+        let (may_be, stranger) = match other.causes() {
+            0 if self.is_unlisted() && other.chosen.says_all(&other.bench.data) => (false, 0.0),
+            0 => (self.chosen.shows_beside_coefficients(&self.bench.data), 0.0),
+            _ => (true, f64::from(self.is_unlisted()) - f64::from(other.is_unlisted())),
+        };
+        self.causes() > 0 && may_be && self.odds_against(other) > LEAST_EVIDENCE * (more + stranger)
+    }
+
+    /// Whether what was found is a cause in no library.
+    fn is_unlisted(&self) -> bool {
+        self.chosen.best.hypothesis.beside.is_some()
     }
 
     /// How many causes were found, one in no library among them.

@@ -8,7 +8,8 @@ use crate::diagnosis::unlisted::{Shown, Unlisted};
 use rayon::prelude::*;
 
 impl Search<'_, '_> {
-    /// The best of them that is worth a word: it shows, with the odds and the share of the error that an effect needs to be named.
+    /// The best of them that is worth a word: it shows, and has the odds and the share of the error, seen and unseen, that an effect needs
+    /// to be named.
     pub(super) fn best_unlisted(&self) -> Option<Judged> {
         let shown = Shown::beside(&self.bench.data, &self.baseline.parameters)?;
         let mut each: Vec<Unlisted> = Vec::new();
@@ -19,14 +20,18 @@ impl Search<'_, '_> {
         }
         let fits = each.into_iter().filter_map(|cause| {
             let best = self.most_promising(&shown, cause.nearby()).into_iter().next()?;
-            Some(self.judge(self.bench.fit_beside(&self.baseline, best, &shown.by(best)?, Scope::All)?))
-        });
-        let explain = fits.filter(|fit| {
-            fit.evidence > LEAST_EVIDENCE
+            let course = shown.by(best)?;
+            let fit = self.judge(self.bench.fit_beside(&self.baseline, best, &course, Scope::All)?);
+            let explains = fit.evidence > LEAST_EVIDENCE
                 && fit.explained > LEAST_EXPLAINED.0
-                && self.shows(&self.baseline.losses, &fit.fitted.losses)
+                && self.shows(&self.baseline.losses, &fit.fitted.losses);
+            let foretells = || {
+                let trained = self.bench.fit_beside(&self.baseline, best, &course, Scope::Training)?;
+                self.holds(&trained, Scope::Training)
+            };
+            (explains && foretells() == Some(true)).then_some(fit)
         });
-        explain.max_by(|a, b| a.score.total_cmp(&b.score))
+        fits.max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
     /// Causes that may take something off the error, the most promising first.

@@ -42,23 +42,29 @@ impl Search<'_, '_> {
                 singles: singles.clone(),
             })
         };
-        // What there is where nothing can be named.
-        let else_there = || match &self.unlisted {
+        // What there is where nothing can be named: a cause in no library, if there is one that does better.
+        let else_there = |unlisted: Option<&Judged>| match unlisted {
             Some(unlisted) => refused(Verdict::Unexplained, &unlisted.fitted),
             None if self.is_sound(&self.baseline.losses) => refused(Verdict::Nominal, &self.baseline),
             None => refused(Verdict::Unexplained, &self.baseline),
         };
-        let Some(best) = self.leading(levels).map(|best| self.pruned(best.clone())) else { return else_there() };
-        let is_makeshift = is_better_if_impossible(levels, &best) || self.unlisted_instead_of(&best).is_some();
-        if best.explained < least_explained(&best.fitted).0 || is_makeshift {
-            return else_there();
+        let Some(best) = self.leading(levels).map(|best| self.pruned(best.clone())) else {
+            return else_there(self.unlisted.as_ref());
+        };
+        let instead = self.unlisted_instead_of(&best);
+        if best.explained < least_explained(&best.fitted).0 || is_better_if_impossible(levels, &best) {
+            return else_there(instead);
         }
         let plain = self.simplest(&best);
         let size = plain.fitted.hypothesis.size();
         let told = self.without_idle(plain.clone());
+        // As it is told, without refinements that only comparisons paid for, it must lose, too.
+        if instead.is_some() && self.unlisted_instead_of(&told).is_some() {
+            return else_there(instead);
+        }
         let are_idle = told.fitted.hypothesis.size() < size;
         let foretold = self.foretelling(told).or_else(|| if are_idle { self.foretelling(plain) } else { None });
-        let Some((model, holds_out)) = foretold else { return else_there() };
+        let Some((model, holds_out)) = foretold else { return else_there(instead) };
         let of_as_many = levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
         let rivals = self.rivals(&best, size, of_as_many.map_or(&[], |level| level));
         let alternatives: Vec<Vec<&'static str>> =
@@ -157,7 +163,7 @@ impl Search<'_, '_> {
     }
 
     /// Whether a fit does better than the baseline, fitted to some samples, does on all others.
-    fn holds(&self, fitted: &Fitted, seen: Scope) -> Option<bool> {
+    pub(super) fn holds(&self, fitted: &Fitted, seen: Scope) -> Option<bool> {
         let Fitted { hypothesis, parameters, .. } = &self.baseline;
         let baseline = self.bench.exact_fit(hypothesis, parameters, seen)?;
         let unseen = |of: &Fitted| self.bench.data.losses(&of.residuals, seen.others());
