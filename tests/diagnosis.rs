@@ -25,6 +25,14 @@ fn as_it_is(name: &str) -> Recording {
     recording(name, |_, _, cell| cell.to_owned())
 }
 
+/// A shipped recording with something added to a column that depends on the row, in the column's unit.
+fn with_added(name: &str, to: &str, added: impl Fn(usize) -> f64) -> Recording {
+    recording(name, |row, column, cell| match cell.parse::<f64>() {
+        Ok(value) if column == to => (value + added(row)).to_string(),
+        _ => cell.to_owned(),
+    })
+}
+
 fn diagnosis_of(recordings: &[Recording]) -> Diagnosis {
     diagnose(&Parameters::default(), recordings, DEFAULT_TOLERANCE, &|_| ()).unwrap()
 }
@@ -82,11 +90,7 @@ fn friction_is_found_from_pressure_and_force_alone() {
 #[test]
 fn a_shifted_position_sensor_is_found_in_hanging_and_prescribed_motion() {
     for name in ["nominal_40kg.csv", "prescribed_motion.csv"] {
-        let shifted = recording(name, |_, column, cell| match cell.parse::<f64>() {
-            Ok(value) if column == "contraction" => (value + 20.0).to_string(),
-            _ => cell.to_owned(),
-        });
-        let found = diagnosis_of(&[shifted]);
+        let found = diagnosis_of(&[with_added(name, "contraction", |_| 20.0)]);
         assert_eq!(causes(&found), ["contraction_sensor_offset"], "{name}");
         // With one load a shift is in part what an area within the tolerance does, too.
         let offset = &found.causes[0].parameters[0];
@@ -106,16 +110,10 @@ fn a_cause_in_no_library_that_is_known_by_its_course_gets_no_name_of_another() {
         let slips = velocity[k] < -25e-3;
         lost.push(lost[k - 1] + if slips { 0.004 * velocity[k] * (whole.time[k] - whole.time[k - 1]) } else { 0.0 });
     }
-    let added = |column: &'static str, error: &dyn Fn(usize) -> f64| {
-        recording("nominal_40kg.csv", |k, of, cell| match cell.parse::<f64>() {
-            Ok(value) if of == column => (value + error(k)).to_string(),
-            _ => cell.to_owned(),
-        })
-    };
-    let slipping = added("contraction", &|k| -1e3 * lost[k]);
+    let slipping = with_added("nominal_40kg.csv", "contraction", |k| -1e3 * lost[k]);
     // The line of the command talks into the amplifier of the force sensor.
     let command = whole.bridged(Command).unwrap();
-    let talking = added("force", &|k| 2.0 * command[k]);
+    let talking = with_added("nominal_40kg.csv", "force", |k| 2.0 * command[k]);
     for (spoilt, signal, on) in [(slipping, Contraction, "way moved down"), (talking, Force, "the command")] {
         let found = diagnosis_of(&[spoilt]);
         assert_eq!((found.verdict, causes(&found)), (Verdict::Unexplained, vec![]), "{on}");
@@ -126,12 +124,7 @@ fn a_cause_in_no_library_that_is_known_by_its_course_gets_no_name_of_another() {
 
 #[test]
 fn a_zero_that_is_set_anew_in_each_recording_is_one_cause() {
-    let shifted = |name: &str, millimetres: f64| {
-        recording(name, |_, column, cell| match cell.parse::<f64>() {
-            Ok(value) if column == "contraction" => (value + millimetres).to_string(),
-            _ => cell.to_owned(),
-        })
-    };
+    let shifted = |name: &str, millimetres: f64| with_added(name, "contraction", |_| millimetres);
     let found =
         diagnosis_of(&numbered(vec![shifted("nominal_40kg.csv", 12.0), shifted("prescribed_motion.csv", -6.0)]));
     assert_eq!((found.verdict, causes(&found)), (Verdict::Explained, vec!["contraction_sensor_offset"]));
@@ -208,9 +201,6 @@ fn an_unknown_cause_gets_a_correction_and_no_name() {
 
 /// A shipped recording with a force in N added that depends on the contraction in mm.
 fn spoilt_force(name: &str, added: impl Fn(f64) -> f64) -> Recording {
-    let contraction = as_it_is(name).bridged(sinew::measurement::Signal::Contraction).unwrap();
-    recording(name, |row, column, cell| match cell.parse::<f64>() {
-        Ok(force) if column == "force" => (force + added(1e3 * contraction[row])).to_string(),
-        _ => cell.to_owned(),
-    })
+    let contraction = as_it_is(name).bridged(Contraction).unwrap();
+    with_added(name, "force", |row| added(1e3 * contraction[row]))
 }

@@ -547,8 +547,7 @@ impl<'a> Bench<'a> {
     /// The baseline with a cause beside it that is in no library, given what one of size one adds to the residuals; fitted to the samples in
     /// scope. `None` where it adds nothing.
     pub fn fit_beside(&self, baseline: &Fitted, cause: Unlisted, course: &[f64], scope: Scope) -> Option<Fitted> {
-        let scale = self.scale(course, baseline)?;
-        let course: Vec<f64> = course.iter().map(|value| scale * value).collect();
+        let (scale, course) = self.as_large(course, baseline)?;
         let (smallest, largest) = cause.sizes();
         let (variables, mut free) = self.everything_free(&baseline.hypothesis, &baseline.parameters);
         let (lower, upper) = ((smallest / scale).max(-MANY_TIMES), (largest / scale).min(MANY_TIMES));
@@ -573,16 +572,15 @@ impl<'a> Bench<'a> {
 
     /// Share of the squares that may go away with an error of readings that has a course of its own, as for starts of effects.
     pub fn promise_of_course(&self, base: &Fitted, course: &[f64]) -> f64 {
-        let Some(scale) = self.scale(course, base) else { return 0.0 };
-        let course: Vec<f64> = course.iter().map(|value| scale * value).collect();
-        self.promise(base, vec![weighted(&course, &self.weights)])
+        self.as_large(course, base)
+            .map_or(0.0, |(_, course)| self.promise(base, vec![weighted(&course, &self.weights)]))
     }
 
-    /// By how much a course must be larger to have as large squares as a fit leaves; `None` where it is zero.
-    fn scale(&self, course: &[f64], fitted: &Fitted) -> Option<f64> {
+    /// By how much a course must be larger to have as large squares as a fit leaves, and as it is then; `None` where it is zero.
+    fn as_large(&self, course: &[f64], fitted: &Fitted) -> Option<(f64, Vec<f64>)> {
         let [own, wanted] = [course, &fitted.residuals].map(|values| cost(values, &self.weights));
         let scale = (wanted / own).sqrt();
-        (scale.is_finite() && scale > 0.0).then_some(scale)
+        (scale.is_finite() && scale > 0.0).then(|| (scale, course.iter().map(|value| scale * value).collect()))
     }
 
     /// A fit with one of its effects at its neutral defaults and all else as it was; `None` where that cannot be simulated.

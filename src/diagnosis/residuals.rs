@@ -6,7 +6,7 @@ use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality::correlation;
 use crate::quality::sensors::resolution;
-use crate::simulation::{OUTPUTS, replay, replay_within, start_deviation};
+use crate::simulation::{OUTPUTS, Replay, replay, replay_within, start_deviation};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -289,10 +289,15 @@ impl<'a> Data<'a> {
         self.segments.last().map_or(0, |segment| segment.range.end)
     }
 
+    /// Simulations of a model on recordings; `None` where one cannot be done.
+    pub fn replays(&self, recordings: &[Recording], parameters: &Parameters) -> Option<Vec<Replay>> {
+        let replayed = |recording| replay_within(parameters, recording, self.integration).ok();
+        recordings.par_iter().map(replayed).collect()
+    }
+
     /// Residuals of simulations on recordings whose `every`-th samples are those of this data.
     fn residuals_on(&self, recordings: &[Recording], every: usize, parameters: &Parameters) -> Option<Vec<f64>> {
-        let replayed = |recording| replay_within(parameters, recording, self.integration).ok();
-        let replays: Vec<_> = recordings.par_iter().map(replayed).collect::<Option<_>>()?;
+        let replays = self.replays(recordings, parameters)?;
         let mut all = Vec::with_capacity(self.count());
         for segment in &self.segments {
             let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);

@@ -4,7 +4,7 @@
 use super::residuals::Data;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
-use crate::simulation::{Replay, replay_within, slopes};
+use crate::simulation::{Replay, slopes};
 
 /// Speeds in m/s above which a measuring wheel may slip.
 const SLIPPING: [f64; 7] = [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.07];
@@ -15,8 +15,6 @@ const FINE_STEPS: i32 = 8;
 /// Damping ratios of a post: of the first look, and then.
 const DAMPING: f64 = 0.05;
 const DAMPINGS: [f64; 4] = [0.01, 0.025, 0.05, 0.1];
-/// Longest step in radians of the oscillation with which a post is simulated.
-const LONGEST_STEP: f64 = 0.1;
 
 /// A cause in no library.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,9 +102,7 @@ impl Unlisted {
             Self::CrossTalk(_) => recording.bridged(Signal::Command),
             Self::Slip { direction, speed } => {
                 let velocity = slopes(time, simulated.get(Signal::Contraction)?);
-                let slips = |v: f64| v.abs() > speed && v * direction >= 0.0;
-                let lost = velocity.iter().map(|v| if slips(*v) { -*v } else { 0.0 });
-                Some(integral(time, &lost.collect::<Vec<_>>()))
+                Some(lost_way(time, &velocity, direction, speed))
             }
             Self::Rocking { frequency, damping } => {
                 Some(rocking(time, simulated.get(Signal::Contraction)?, frequency, damping))
@@ -124,8 +120,7 @@ pub struct Shown<'d> {
 impl<'d> Shown<'d> {
     /// `None` where the model cannot be simulated.
     pub fn beside(data: &'d Data<'d>, model: &Parameters) -> Option<Self> {
-        let replayed = data.recordings().iter().map(|recording| replay_within(model, recording, data.integration).ok());
-        Some(Self { data, simulated: replayed.collect::<Option<_>>()? })
+        Some(Self { data, simulated: data.replays(data.recordings(), model)? })
     }
 
     /// What a cause of size one adds to the readings, one value per residual; `None` where it cannot show.
@@ -137,47 +132,37 @@ impl<'d> Shown<'d> {
     }
 }
 
-/// Integral over time by trapezia, zero at the start.
-fn integral(time: &[f64], rate: &[f64]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let steps =
-        time.windows(2).zip(rate.windows(2)).map(|(time, rate)| 0.5 * (time[1] - time[0]) * (rate[0] + rate[1]));
-    let sums = steps.map(|step| {
-        sum += step;
-        sum
+/// What a reading is off by that misses all of the way which is moved in a direction faster than a speed; integrated by trapezia.
+fn lost_way(time: &[f64], velocity: &[f64], direction: f64, speed: f64) -> Vec<f64> {
+    let slipping = |v: f64| if v.abs() > speed && v * direction >= 0.0 { -v } else { 0.0 };
+    let mut lost = 0.0;
+    let sums = time.windows(2).zip(velocity.windows(2)).map(|(time, v)| {
+        lost += 0.5 * (time[1] - time[0]) * (slipping(v[0]) + slipping(v[1]));
+        lost
     });
     std::iter::once(0.0).chain(sums).collect()
 }
 
-/// Deflection y of a post whose foot is accelerated as x is, ÿ + 2ζωẏ + ω²y = ẍ, at rest at the start. With z = y − x no derivative of x
-/// is needed but its slope between samples; steps of Runge and Kutta's fourth order.
+/// Deflection y of a post whose foot is accelerated as x is, ÿ + 2ζωẏ + ω²y = ẍ with ζ < 1, at rest at the start. Where x goes along
+/// straight lines between its samples the foot's speed jumps there, and in between the post swings freely: that is exact.
 fn rocking(time: &[f64], x: &[f64], frequency: f64, damping: f64) -> Vec<f64> {
     let rate = std::f64::consts::TAU * frequency;
-    let (mut z, mut speed) = (-x[0], 0.0);
-    // From rest z = −x would be kept in place by x alone.
-    let mut deflections = vec![0.0];
-    for k in 1..time.len() {
+    let (decay, swing) = (damping * rate, rate * (1.0 - damping * damping).sqrt());
+    let (mut y, mut speed, mut slope) = (0.0, 0.0, 0.0);
+    let swung = (1..time.len()).map(|k| {
         let span = time[k] - time[k - 1];
-        let slope = (x[k] - x[k - 1]) / span;
-        let steps = (rate * span / LONGEST_STEP).ceil().max(1.0);
-        let step = span / steps;
-        let acceleration = |after: f64, z: f64, speed: f64| {
-            -2.0 * damping * rate * (speed + slope) - rate * rate * (z + x[k - 1] + slope * after)
-        };
-        let mut after = 0.0;
-        while after < span - 0.5 * step {
-            let half = 0.5 * step;
-            let (v1, a1) = (speed, acceleration(after, z, speed));
-            let (v2, a2) = (speed + half * a1, acceleration(after + half, z + half * v1, speed + half * a1));
-            let (v3, a3) = (speed + half * a2, acceleration(after + half, z + half * v2, speed + half * a2));
-            let (v4, a4) = (speed + step * a3, acceleration(after + step, z + step * v3, speed + step * a3));
-            z += step / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4);
-            speed += step / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
-            after += step;
-        }
-        deflections.push(z + x[k]);
-    }
-    deflections
+        let next = (x[k] - x[k - 1]) / span;
+        speed += next - slope;
+        slope = next;
+        let (sine, cosine) = (swing * span).sin_cos();
+        let (left, sine) = ((-decay * span).exp(), sine / swing);
+        (y, speed) = (
+            left * ((cosine + decay * sine) * y + sine * speed),
+            left * ((cosine - decay * sine) * speed - rate * rate * sine * y),
+        );
+        y
+    });
+    std::iter::once(0.0).chain(swung).collect()
 }
 
 #[cfg(test)]
@@ -197,8 +182,24 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_loses_way_in_one_direction_only() {
-        let time = [0.0, 1.0, 2.0, 3.0];
-        assert_eq!(integral(&time, &[0.0, 2.0, 2.0, 0.0]), [0.0, 1.0, 3.0, 4.0]);
+    fn a_post_that_was_knocked_swings_on_by_itself() {
+        // From the start on the foot moves with 1 m/s: y = e^(−ζωt) sin(ω_d t) / ω_d.
+        let (frequency, damping) = (2.5, 0.05);
+        let time: Vec<f64> = (0..200).map(|k| 1e-2 * f64::from(k) + 2e-3 * f64::from(k % 3)).collect();
+        let rate = std::f64::consts::TAU * frequency;
+        let swing = rate * f64::sqrt(1.0 - damping * damping);
+        for (t, y) in time.iter().zip(rocking(&time, &time, frequency, damping)) {
+            let expected = (-damping * rate * t).exp() * (swing * t).sin() / swing;
+            assert!((y - expected).abs() < 1e-12, "{t} s: {y} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_wheel_loses_way_in_one_direction_and_above_a_speed_only() {
+        let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        let velocity = [0.0, -2.0, -2.0, -0.5, 3.0, 3.0];
+        assert_eq!(lost_way(&time, &velocity, -1.0, 1.0), [0.0, 1.0, 3.0, 4.0, 4.0, 4.0]);
+        assert_eq!(lost_way(&time, &velocity, 1.0, 1.0), [0.0, 0.0, 0.0, 0.0, -1.5, -4.5]);
+        assert_eq!(lost_way(&time, &velocity, 0.0, 1.0), [0.0, 1.0, 3.0, 4.0, 2.5, -0.5]);
     }
 }
