@@ -54,6 +54,9 @@ const SMALL_GAIN: f64 = 1e-3;
 /// An error of a reading is no more than so many times what a fit leaves.
 const MANY_TIMES: f64 = 100.0;
 
+/// Share of its usual span below which a change of a parameter is too small to tell its slope.
+const LEAST_TYPICAL: f64 = 1e-3;
+
 /// Simulations that are kept: of the longest recordings they take 40 MB.
 const KEPT: usize = 128;
 
@@ -414,7 +417,7 @@ impl<'a> Bench<'a> {
     pub fn baseline(&mut self) -> Option<Fitted> {
         let nominal = Hypothesis::default();
         let first = self.exact_fit(&nominal, self.nominal, Scope::All)?;
-        self.slopes = self.slopes_at(&first.parameters, &first.residuals);
+        self.slopes = self.slopes_at(&first.parameters)?;
         self.fit(&nominal, &first.parameters, Scope::All, &self.slopes, EXACT)
     }
 
@@ -431,11 +434,6 @@ impl<'a> Bench<'a> {
         self.fit(hypothesis, start, Scope::All, slopes, ROUGH)
     }
 
-    /// Slopes at a fit.
-    pub fn slopes_of(&self, fitted: &Fitted) -> Slopes {
-        self.slopes_at(&fitted.parameters, &fitted.residuals)
-    }
-
     /// Fits a hypothesis to the end on the samples in scope, starting from a model that is about right. What the
     /// corrections do is looked at anew until that helps no more.
     ///
@@ -444,7 +442,7 @@ impl<'a> Bench<'a> {
         let mut best: Option<(Fitted, f64)> = None;
         for _ in 0..MOST_ROUNDS {
             let from = best.as_ref().map_or(*start, |(fitted, _)| fitted.parameters);
-            let slopes = self.slopes_at(&from, &self.residuals(&from)?);
+            let slopes = self.slopes_at(&from)?;
             let fitted = self.fit(hypothesis, &from, scope, &slopes, EXACT)?;
             let cost = cost(&fitted.residuals, &self.data.weights(scope));
             let before = best.as_ref().map_or(f64::INFINITY, |(_, cost)| *cost);
@@ -594,9 +592,7 @@ impl<'a> Bench<'a> {
     /// them than that (Laplace's approximation of the evidence, D. MacKay 1992, doi 10.1162/neco.1992.4.3.415).
     pub fn price(&self, fitted: &Fitted) -> f64 {
         let weights = self.data.weights_beside_structure();
-        // What is beside a model is no part of its residuals.
-        let residuals = self.residuals(&fitted.parameters).unwrap_or_else(|| fitted.residuals.clone());
-        let slopes = self.slopes_at(&fitted.parameters, &residuals);
+        let slopes = self.slopes_at(&fitted.parameters).unwrap_or_default();
         let expected = self.corrections.iter().zip(slopes).filter_map(|((variable, correction), slope)| {
             let (mean, deviation) = correction.prior?;
             let off = (declared(&fitted.parameters, variable.name).1 - mean) / deviation;
@@ -606,10 +602,13 @@ impl<'a> Bench<'a> {
         price(&off, &columns)
     }
 
-    fn slopes_at(&self, model: &Parameters, residuals: &[f64]) -> Slopes {
+    /// What the corrections do to the residuals of a model; `None` where it cannot be simulated.
+    pub fn slopes_at(&self, model: &Parameters) -> Option<Slopes> {
+        let here = self.residuals(model)?;
         let (variables, free): (Vec<_>, Vec<_>) = self.corrections.iter().copied().unzip();
         let at: Vec<f64> = variables.iter().map(|variable| declared(model, variable.name).1).collect();
-        derivatives(&|values: &[f64]| self.residuals(&with_values(model, &variables, values)), &free, &at, residuals)
+        let residuals = |values: &[f64]| self.residuals(&with_values(model, &variables, values));
+        Some(derivatives(&residuals, &free, &at, &here))
     }
 
     fn fitted(&self, hypothesis: &Hypothesis, parameters: Parameters, residuals: Vec<f64>) -> Fitted {
@@ -655,7 +654,10 @@ impl<'a> Bench<'a> {
             let change = changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect::<Vec<_>>();
             Some(weighted(&change, &self.weights))
         };
-        let whole = change(&parameters)?;
+        let mut whole = change(&parameters)?;
+        if many_minima(part.size()) {
+            self.forgive(base, &mut whole);
+        }
         // What shows nothing at a usual size cannot be told from nothing.
         if whole.iter().map(|c| c * c).sum::<f64>() < 1.0 {
             return None;
@@ -668,6 +670,25 @@ impl<'a> Bench<'a> {
         let in_others = without.filter_map(|model| change(&model));
         let promise = self.promise(base, [whole].into_iter().chain(in_others).collect());
         Some(Start { promise, part, choice, parameters })
+    }
+
+    /// Takes back what a change does in blocks that it makes worse: where each jump hangs on the ones before, a size that is not quite right
+    /// goes wrong for a while by chance.
+    fn forgive(&self, base: &Fitted, change: &mut [f64]) {
+        let blocks = self.data.blocks();
+        let mut worse = vec![0.0; blocks.iter().max().map_or(0, |last| last + 1)];
+        for (block, (residual, by)) in blocks.iter().zip(weighted(&base.residuals, &self.weights).iter().zip(&*change))
+        {
+            worse[*block] += (residual + by).powi(2) - residual.powi(2);
+        }
+        change.iter_mut().zip(&blocks).filter(|(_, block)| worse[**block] > 0.0).for_each(|(by, _)| *by = 0.0);
+    }
+
+    /// A start with the best size nearby, where the error has many minima over it.
+    pub fn settled(&self, start: &Start) -> Parameters {
+        let size = start.part.size();
+        let nearby = || self.best_nearby(&start.parameters, size.0, SCANS[0]);
+        if many_minima(size) { nearby().map_or(start.parameters, |(_, model)| model) } else { start.parameters }
     }
 
     /// A model with an effect of its own exchanged for another form of it, at the start that leaves least, be it with what both
@@ -804,7 +825,7 @@ pub(super) fn bounds(variables: &[&'static Variable], start: &Parameters) -> Vec
     let bounds = |variable: &&'static Variable| {
         let start = declared(start, variable.name).1;
         let span = (variable.max - variable.min).min(2.0 * variable.unit.nominal);
-        let typical = if start == 0.0 { 0.05 * span } else { start.abs() };
+        let typical = if start == 0.0 { 0.05 * span } else { start.abs().max(LEAST_TYPICAL * span) };
         Free { start, lower: variable.min, upper: variable.max, typical, prior: None }
     };
     variables.iter().map(bounds).collect()

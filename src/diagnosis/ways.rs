@@ -1,7 +1,7 @@
 //! How the coefficients of a nominal muscle are off decides what is an effect: off as a whole, most muscles show small ones; coefficients
 //! that are each off by themselves can stand for many. Bayes' rule weighs both.
 
-use super::candidates::{Bench, Fitted};
+use super::candidates::{Bench, Fitted, Hypothesis, neutralised};
 use super::residuals::Scope;
 use super::selection::evidence::{is_unsound, odds};
 use super::selection::{Chosen, LEAST_EVIDENCE, MOST_EFFECTS, Search};
@@ -107,9 +107,30 @@ impl Found<'_> {
         self.chosen.best.hypothesis.causes()
     }
 
-    /// Logarithm of the odds for the best fit here against the other one; the likelihoods are those of the other one's data.
+    /// Logarithm of the odds for the best fit here against that of another way, be it with the causes that both found in the forms that they
+    /// have here: which form fits best hangs on how the coefficients may be off.
     fn odds_against(&self, other: &Self) -> f64 {
+        let in_these_forms = other.in_forms_of(self);
+        let each = [Some(&other.chosen.best), in_these_forms.as_ref()];
+        each.into_iter().flatten().map(|fit| self.odds_against_fit(other, fit)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The best fit with the causes that were found elsewhere, too, in the forms that they have there; `None` where none was.
+    fn in_forms_of(&self, other: &Self) -> Option<Fitted> {
         let [own, others] = [&self.chosen.best, &other.chosen.best];
+        let shared = others.hypothesis.parts.iter().copied().filter(|part| own.hypothesis.has(part.effect.name));
+        let shared = Hypothesis { parts: shared.collect(), beside: None };
+        if shared.parts.is_empty() || own.hypothesis.names() == others.hypothesis.names() {
+            return None;
+        }
+        let hypothesis = shared.parts.iter().fold(own.hypothesis.clone(), |all, part| all.in_form_of(*part));
+        let without = shared.parts.iter().fold(own.parameters, |model, part| neutralised(&model, part.effect));
+        self.bench.exact_fit(&hypothesis, &shared.at_work_in(&without, &others.parameters), Scope::All)
+    }
+
+    /// The odds against one fit of the other way; the likelihoods are those of the other one's data.
+    fn odds_against_fit(&self, other: &Self, others: &Fitted) -> f64 {
+        let own = &self.chosen.best;
         let losses = |fitted: &Fitted| other.bench.data.losses(&fitted.residuals, Scope::All);
         let (mut with, without) = (losses(own), losses(others));
         // The whiter residuals say how much a sample is worth, but no shape of a sound muscle is worth more than once in a block.

@@ -6,6 +6,13 @@ const LEAST_SHARE: f64 = 0.05;
 /// Shortest time constant of a pole of its own, s: no sample shows less, and it keeps the integrator from tiny steps.
 const SHORTEST: f64 = 1e-3;
 
+/// What comes out of a pole with so long a time constant: of a shorter one than the shortest, as much of that as delays by it, so that a
+/// fit finds its way back from there.
+fn passed(input: f64, own: f64, time_constant: f64) -> f64 {
+    let share = (time_constant / SHORTEST).min(1.0);
+    if share == 1.0 { own } else { input + share * (own - input) }
+}
+
 crate::variables::variables! {
     /// A valve that follows more slowly than nominal.
     ///
@@ -20,8 +27,8 @@ crate::variables::variables! {
     /// several sizes separate it from a dead time (whose onset shifts) and from a rate limit (large steps only).
     ///
     /// # Validity
-    /// The time constant is kept above 5 % of its value at 2 bar, that of a pole of its own above 1 ms. These poles start
-    /// settled at the first pressure.
+    /// The time constant is kept above 5 % of its value at 2 bar. A pole of its own below 1 ms is one of 1 ms that lets the rest
+    /// through, so that the mean delay is the same. These poles start settled at the first pressure.
     ///
     /// # Reference
     /// Thesis eq. 5.3.
@@ -78,7 +85,7 @@ impl Effect for ValveLag {
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
-        let second = if self.second_time_constant == 0.0 { at.commanded_pressure } else { own[0] };
+        let second = passed(at.commanded_pressure, own[0], self.second_time_constant);
         if self.second_time_constant > 0.0 {
             rates[0] = (at.commanded_pressure - own[0]) / self.second_time_constant.max(SHORTEST);
         }
@@ -88,11 +95,8 @@ impl Effect for ValveLag {
     }
 
     fn target_pressure(&self, _at: &Point, own: &[f64], target: f64) -> f64 {
-        match (self.second_time_constant, self.third_time_constant) {
-            (0.0, 0.0) => target,
-            (_, 0.0) => own[0],
-            _ => own[1],
-        }
+        let second = passed(target, own[0], self.second_time_constant);
+        passed(second, own[1], self.third_time_constant)
     }
 
     fn valve_bandwidth(&self, at: &Point, bandwidth: f64) -> f64 {

@@ -136,7 +136,7 @@ impl Search<'_, '_> {
         };
         ways.dedup(); // where there is none
         // What hangs on details hangs on what the corrections do here, too.
-        let slopes = self.bench.slopes_of(&judged.fitted);
+        let Some(slopes) = self.bench.slopes_at(&judged.fitted.parameters) else { return judged };
         let refined_by = |ways: Vec<Refined>| -> Vec<Judged> {
             ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes)).collect()
         };

@@ -193,7 +193,8 @@ impl<'a, 'b> Search<'a, 'b> {
         let best = |starts: Vec<Start>| {
             let also = ALSO_PROMISING * starts[0].promise;
             let fits = distinct(&starts).take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
-                Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &start.parameters)?))
+                let from = self.bench.settled(start);
+                Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &from)?))
             });
             fits.max_by(|a, b| a.score.total_cmp(&b.score))
         };
