@@ -1,4 +1,4 @@
-use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point, REFERENCE_PRESSURE};
+use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point, REFERENCE_CONTRACTION, REFERENCE_PRESSURE};
 
 /// Rate in Pa/s from which on there is no limit.
 const NONE: f64 = 1e9;
@@ -12,10 +12,11 @@ crate::variables::variables! {
     /// The rate r of pressure becomes r / (1 + |r/m|ⁿ)^(1/n), n = 1/`roundness`; for zero roundness it is clipped at m.
     /// The limit m is `filling` or `emptying`; the latter changes with absolute pressure by the share
     /// `emptying_with_pressure` c, m (1 − c + c (p + 1 bar)/3 bar), and both shrink with the volume,
-    /// m / (1 + `volume_growth` x/0.1 m), and grow with what is missing, m (|p_target − p|/1 bar)^e, `exponent` e. Where the
+    /// m / (1 + `volume_growth` g x/0.1 m), and grow with what is missing, m (|p_target − p|/1 bar)^e, `exponent` e. Where the
     /// pressure p_s of the supply is known, `supply_pressure`, filling fades towards it by ψ(p/p_s), absolute, and emptying is in
     /// proportion to absolute pressure and fades towards the ambient one by ψ(p_0/p): ψ(r) = √(1 − ((r − b)/(1 − b))²) above
-    /// `critical_ratio` b, 1 below.
+    /// `critical_ratio` b, 1 below. What is limited is a flow of mass: where the muscle moves, n (p + 1 bar) V'/V dx/dt of it only keeps the
+    /// pressure, V'/V = g/0.1 m / (1 + g x/0.1 m), `polytropic_exponent` n; for none, r alone is limited.
     ///
     /// # In the data
     /// After large steps the pressure rises along a ramp whose slope does not depend on the size of the step, and falls
@@ -23,8 +24,8 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// A stand-in for ISO 6358: choked inflow gives a constant rate, choked outflow one in proportion to absolute
-    /// pressure; the roundness in between is no physical constant. With a pressure of the supply it is the standard itself, for
-    /// isothermal air. A long narrow hose with turbulent flow lets through what goes with the root of the difference in
+    /// pressure; the roundness in between is no physical constant. With a pressure of the supply and an exponent (1 isothermal, 1.4
+    /// adiabatic) it is the standard itself. A long narrow hose with turbulent flow lets through what goes with the root of the difference in
     /// pressure, `exponent` 0.5.
     ///
     /// # Reference
@@ -40,6 +41,8 @@ crate::variables::variables! {
         emptying_with_pressure: f64 = 0.0, ONE, (0.0..=1.0);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
+        /// Polytropic exponent of the air that the muscle displaces as it moves; that needs no flow for 0
+        polytropic_exponent: f64 = 0.0, ONE, (0.0..=2.0);
         /// Power of the missing pressure, in bar, with which the limits grow
         exponent: f64 = 0.0, ONE, (0.0..=1.0);
         /// Gauge pressure of the supply; the flow does not fade towards it at the largest value
@@ -53,6 +56,8 @@ crate::variables::variables! {
 const LEAST_MISSING: f64 = 10.0;
 /// Share of the choked flow that there is at least; not physical, it keeps a limit above zero.
 const LEAST_SHARE: f64 = 1e-3;
+/// Share of the volume at rest that there is at least; not physical, it keeps the limits finite.
+const LEAST_VOLUME: f64 = 0.1;
 
 impl FlowLimit {
     fn limit(&self, at: &Point, rate: f64) -> f64 {
@@ -65,12 +70,32 @@ impl FlowLimit {
             (false, true) => self.emptying * relative * self.share_of_choked(AMBIENT_PRESSURE / absolute),
             (false, false) => self.emptying * (1.0 + self.emptying_with_pressure * (relative - 1.0)),
         };
-        let most = most / (1.0 + self.volume_growth * at.relative_contraction()).max(0.1);
+        let most = most / (1.0 + self.volume_growth * at.relative_contraction()).max(LEAST_VOLUME);
         if self.exponent == 0.0 {
             return most;
         }
         let missing = (at.target_pressure - at.gauge_pressure).abs() + LEAST_MISSING;
         most * (missing / 1e5).powf(self.exponent)
+    }
+
+    /// Rate in Pa/s that the flow must make up for because the volume grows.
+    fn displaced(&self, at: &Point) -> f64 {
+        let volume = (1.0 + self.volume_growth * at.relative_contraction()).max(LEAST_VOLUME);
+        let growth = self.volume_growth / REFERENCE_CONTRACTION * at.contraction_velocity / volume;
+        self.polytropic_exponent * (at.gauge_pressure + AMBIENT_PRESSURE) * growth
+    }
+
+    fn limited(&self, at: &Point, rate: f64) -> f64 {
+        let most = self.limit(at, rate);
+        // Below 1 % roundness nobody could tell the curve from the corner.
+        if self.roundness < 0.01 {
+            return rate.max(-most).min(most);
+        }
+        let excess = (rate / most).abs();
+        if self.roundness == 0.5 {
+            return rate / (1.0 + excess * excess).sqrt();
+        }
+        rate / (1.0 + excess.powf(1.0 / self.roundness)).powf(self.roundness)
     }
 
     /// Flow through a nozzle at a ratio of absolute pressures, as a share of what flows when choked.
@@ -115,6 +140,7 @@ impl Effect for FlowLimit {
             ("flow_limit.roundness", &[0.3]),
             ("flow_limit.emptying_with_pressure", &[0.3]),
             ("flow_limit.volume_growth", &[0.2]),
+            ("flow_limit.polytropic_exponent", &[1.2]),
             ("flow_limit.exponent", &[0.3]),
         ],
     };
@@ -128,16 +154,8 @@ impl Effect for FlowLimit {
         if self.is_neutral() {
             return rate;
         }
-        let most = self.limit(at, rate);
-        let excess = (rate / most).abs();
-        // Below 1 % roundness nobody could tell the curve from the corner.
-        if self.roundness < 0.01 {
-            return rate.max(-most).min(most);
-        }
-        if self.roundness == 0.5 {
-            return rate / (1.0 + excess * excess).sqrt();
-        }
-        rate / (1.0 + excess.powf(1.0 / self.roundness)).powf(self.roundness)
+        let displaced = self.displaced(at);
+        self.limited(at, rate + displaced) - displaced
     }
 
     fn sentence(&self) -> String {

@@ -3,6 +3,9 @@ use super::{Description, Effect, Holds, Point, Readings, of_recording, told_anew
 /// Power in W of the motion for which changes by work are stated.
 const REFERENCE_POWER: f64 = 10.0;
 
+/// Speed in m/s of the motion for which changes by motion are stated.
+const REFERENCE_SPEED: f64 = 0.1;
+
 /// How far warmth may begin the wrong way: two exponentials are only nearly what begins slowly.
 const MOST_ASTRAY: f64 = 0.1;
 /// Time constant in s within which no muscle warms up.
@@ -12,7 +15,8 @@ crate::variables::variables! {
     /// Slow change while the muscle warms up, or its valve or a sensor.
     ///
     /// # Model
-    /// τ₁ dw₁/dt = 1 − k + k |P|/(10 W) − w₁, and w₂ alike with τ₂; P = F_p dx/dt the power of the pressure's pull F_p without effects. With
+    /// τ₁ dw₁/dt = 1 − k + k ((1 − m) |P|/(10 W) + m |dx/dt|/(0.1 m/s)) − w₁, and w₂ alike with τ₂; P = F_p dx/dt the power of the pressure's
+    /// pull F_p without effects, `speed_share` m of what goes with the way alone, as the work of dry friction does. With
     /// w = (1 − s) w₁ + s w₂ the area counts 1 + a w times, the elastic force 1 + e w times and the command of the valve 1 + v w times:
     /// `time_constant` τ₁, `time_constant_2` τ₂, `share_2` s, `work_share` k, `area_change` a, `elastic_change` e, `valve_change` v. A force
     /// sensor shows f w more and a pressure sensor q w, both with k = 0: `force_zero` f, `pressure_zero` q. Heat that spreads begins sooner
@@ -24,7 +28,7 @@ crate::variables::variables! {
     /// every step. No data tell the zero of a sensor that is right when cold and drifts from one that settles.
     ///
     /// # Validity
-    /// The first recording starts cold. Its surroundings warm the muscle, or its own work, of which a fixed share becomes heat; no muscle
+    /// The first recording starts cold. Its surroundings warm the muscle, or its own work or way, of which a fixed share becomes heat; no muscle
     /// warms within less than 3 s.
     ///
     /// # Reference
@@ -44,6 +48,8 @@ crate::variables::variables! {
         time_constant: f64 = 15.0, SECOND, (FASTEST..=1000.0);
         /// Share of the warming that goes with the power of its motion, stated for 10 W
         work_share: f64 = 0.0, ONE, (0.0..=1.0);
+        /// Share of that which goes with its speed instead, stated for 0.1 m/s
+        speed_share: f64 = 0.0, ONE, (0.0..=1.0);
         /// Share of the warming that has another time constant
         share_2: f64 = 0.0, ONE, (-2.0..=1.0);
         /// That time constant
@@ -115,6 +121,7 @@ impl Effect for TemperatureDrift {
         ]],
         refinements: &[
             ("temperature_drift.elastic_change", &[0.05]),
+            ("temperature_drift.speed_share", &[0.5]),
             ("temperature_drift.share_2", &[0.3]),
             ("temperature_drift.time_constant_2", &[100.0]),
             ("temperature_drift.second", &[0.5]),
@@ -139,7 +146,8 @@ impl Effect for TemperatureDrift {
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let power = (at.pressure_pull * at.contraction_velocity).abs() / REFERENCE_POWER;
-        let aim = 1.0 + self.work_share * (power - 1.0);
+        let speed = at.contraction_velocity.abs() / REFERENCE_SPEED;
+        let aim = 1.0 + self.work_share * (power + self.speed_share * (speed - power) - 1.0);
         rates[0] = (aim - own[0]) / self.time_constant;
         rates[1] = (aim - own[1]) / self.time_constant_2;
     }
@@ -176,7 +184,8 @@ impl Effect for TemperatureDrift {
     fn sentence(&self) -> String {
         let by_work = match 100.0 * self.work_share {
             0.0 => String::new(),
-            share => format!(", {share:.0} % of it by its own work, told for 10 W"),
+            share if self.speed_share == 0.0 => format!(", {share:.0} % of it by its own work, told for 10 W"),
+            share => format!(", {share:.0} % of it by its own work and way, told for 10 W and 0.1 m/s"),
         };
         let slowly = match 100.0 * self.share_2 {
             0.0 => String::new(),
