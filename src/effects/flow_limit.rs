@@ -12,11 +12,11 @@ crate::variables::variables! {
     /// The rate r of pressure becomes r / (1 + |r/m|ⁿ)^(1/n), n = 1/`roundness`; for zero roundness it is clipped at m.
     /// The limit m is `filling` or `emptying`; the latter changes with absolute pressure by the share
     /// `emptying_with_pressure` c, m (1 − c + c (p + 1 bar)/3 bar), and both shrink with the volume,
-    /// m / (1 + `volume_growth` g x/0.1 m), and grow with what is missing, m (|p_target − p|/1 bar)^e, `exponent` e. Where the
+    /// m V₀/V, V/V₀ = 1 + g y − h y², y = x/0.1 m, `volume_growth` g, `volume_bend` h, and grow with what is missing, m (|p_target − p|/1 bar)^e, `exponent` e. Where the
     /// pressure p_s of the supply is known, `supply_pressure`, filling fades towards it by ψ(p/p_s), absolute, and emptying is in
     /// proportion to absolute pressure and fades towards the ambient one by ψ(p_0/p): ψ(r) = √(1 − ((r − b)/(1 − b))²) above
     /// `critical_ratio` b, 1 below. What is limited is a flow of mass: where the muscle moves, n (p + 1 bar) V'/V dx/dt of it only keeps the
-    /// pressure, V'/V = g/0.1 m / (1 + g x/0.1 m), `polytropic_exponent` n; for none, r alone is limited.
+    /// pressure, `polytropic_exponent` n; for none, r alone is limited.
     ///
     /// # In the data
     /// After large steps the pressure rises along a ramp whose slope does not depend on the size of the step, and falls
@@ -41,6 +41,8 @@ crate::variables::variables! {
         emptying_with_pressure: f64 = 0.0, ONE, (0.0..=1.0);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
+        /// By how much less than along a straight line the volume grows up to 0.1 m
+        volume_bend: f64 = 0.0, ONE, (0.0..=0.5);
         /// Polytropic exponent of the air that the muscle displaces as it moves; that needs no flow for 0
         polytropic_exponent: f64 = 0.0, ONE, (0.0..=2.0);
         /// Power of the missing pressure, in bar, with which the limits grow
@@ -70,7 +72,7 @@ impl FlowLimit {
             (false, true) => self.emptying * relative * self.share_of_choked(AMBIENT_PRESSURE / absolute),
             (false, false) => self.emptying * (1.0 + self.emptying_with_pressure * (relative - 1.0)),
         };
-        let most = most / (1.0 + self.volume_growth * at.relative_contraction()).max(LEAST_VOLUME);
+        let most = most / self.volume(at);
         if self.exponent == 0.0 {
             return most;
         }
@@ -80,9 +82,15 @@ impl FlowLimit {
 
     /// Rate in Pa/s that the flow must make up for because the volume grows.
     fn displaced(&self, at: &Point) -> f64 {
-        let volume = (1.0 + self.volume_growth * at.relative_contraction()).max(LEAST_VOLUME);
-        let growth = self.volume_growth / REFERENCE_CONTRACTION * at.contraction_velocity / volume;
+        let slope = (self.volume_growth - 2.0 * self.volume_bend * at.relative_contraction()) / REFERENCE_CONTRACTION;
+        let growth = slope * at.contraction_velocity / self.volume(at);
         self.polytropic_exponent * (at.gauge_pressure + AMBIENT_PRESSURE) * growth
+    }
+
+    /// Volume relative to that at rest.
+    fn volume(&self, at: &Point) -> f64 {
+        let contraction = at.relative_contraction();
+        (1.0 + contraction * (self.volume_growth - self.volume_bend * contraction)).max(LEAST_VOLUME)
     }
 
     fn limited(&self, at: &Point, rate: f64) -> f64 {
@@ -139,7 +147,8 @@ impl Effect for FlowLimit {
         refinements: &[
             ("flow_limit.roundness", &[0.3]),
             ("flow_limit.emptying_with_pressure", &[0.3]),
-            ("flow_limit.volume_growth", &[0.2]),
+            ("flow_limit.volume_growth", &[0.5]),
+            ("flow_limit.volume_bend", &[0.1]),
             ("flow_limit.polytropic_exponent", &[1.2]),
             ("flow_limit.exponent", &[0.3]),
         ],
