@@ -191,6 +191,17 @@ fn effects_agree_with_scipy() {
                 ("flow_limit.critical_ratio", 0.4),
             ],
         ),
+        (
+            "moving_volume",
+            &[
+                ("flow_limit.filling", 1.2e5),
+                ("flow_limit.emptying", 0.8e5),
+                ("flow_limit.roundness", 0.25),
+                ("flow_limit.volume_growth", 0.8),
+                ("flow_limit.volume_bend", 0.15),
+                ("flow_limit.polytropic_exponent", 1.2),
+            ],
+        ),
         ("leakage", &[("leakage.rate", 0.8), ("leakage.choked_share", 0.4), ("leakage.volume_growth", 0.4)]),
         ("tear", &[("leakage.rate", 0.6), ("leakage.opening_with_contraction", 1.5)]),
         (
@@ -256,6 +267,16 @@ fn effects_agree_with_scipy() {
                 ("temperature_drift.elastic_change", -0.03),
                 ("temperature_drift.time_constant", 4.0),
                 ("temperature_drift.work_share", 1.0),
+            ],
+        ),
+        (
+            "warm_by_way",
+            &[
+                ("temperature_drift.area_change", 0.02),
+                ("temperature_drift.elastic_change", -0.03),
+                ("temperature_drift.time_constant", 4.0),
+                ("temperature_drift.work_share", 1.0),
+                ("temperature_drift.speed_share", 0.75),
             ],
         ),
         (

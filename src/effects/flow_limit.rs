@@ -11,12 +11,12 @@ crate::variables::variables! {
     /// # Model
     /// The rate r of pressure becomes r / (1 + |r/m|ⁿ)^(1/n), n = 1/`roundness`; for zero roundness it is clipped at m.
     /// The limit m is `filling` or `emptying`; the latter changes with absolute pressure by the share
-    /// `emptying_with_pressure` c, m (1 − c + c (p + 1 bar)/3 bar), and both shrink with the volume,
-    /// m V₀/V, V/V₀ = 1 + g y − h y², y = x/0.1 m, `volume_growth` g, `volume_bend` h, and grow with what is missing, m (|p_target − p|/1 bar)^e, `exponent` e. Where the
-    /// pressure p_s of the supply is known, `supply_pressure`, filling fades towards it by ψ(p/p_s), absolute, and emptying is in
-    /// proportion to absolute pressure and fades towards the ambient one by ψ(p_0/p): ψ(r) = √(1 − ((r − b)/(1 − b))²) above
-    /// `critical_ratio` b, 1 below. What is limited is a flow of mass: where the muscle moves, n (p + 1 bar) V'/V dx/dt of it only keeps the
-    /// pressure, `polytropic_exponent` n; for none, r alone is limited.
+    /// `emptying_with_pressure` c, m (1 − c + c (p + 1 bar)/3 bar), and both shrink with the volume V, m V₀/V,
+    /// V/V₀ = 1 + g y (1 − h y), y = x/0.1 m, `volume_growth` g, `volume_bend` h, and grow with what is missing,
+    /// m (|p_target − p|/1 bar)^e, `exponent` e. Where the pressure p_s of the supply is known, `supply_pressure`, filling fades
+    /// towards it by ψ(p/p_s), absolute, and emptying is in proportion to absolute pressure and fades towards the ambient one by
+    /// ψ(p_0/p): ψ(r) = √(1 − ((r − b)/(1 − b))²) above `critical_ratio` b, 1 below. What is limited is a flow of mass: where the
+    /// muscle moves, κ (p + 1 bar) dV/dt / V of it only keeps the pressure, `polytropic_exponent` κ; for none, r alone is limited.
     ///
     /// # In the data
     /// After large steps the pressure rises along a ramp whose slope does not depend on the size of the step, and falls
@@ -41,8 +41,8 @@ crate::variables::variables! {
         emptying_with_pressure: f64 = 0.0, ONE, (0.0..=1.0);
         /// Relative growth of the volume at 0.1 m of contraction
         volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
-        /// By how much less than along a straight line the volume grows up to 0.1 m
-        volume_bend: f64 = 0.0, ONE, (0.0..=0.5);
+        /// By which share it grows less than along a straight line there
+        volume_bend: f64 = 0.0, ONE, (0.0..=0.2);
         /// Polytropic exponent of the air that the muscle displaces as it moves; that needs no flow for 0
         polytropic_exponent: f64 = 0.0, ONE, (0.0..=2.0);
         /// Power of the missing pressure, in bar, with which the limits grow
@@ -82,7 +82,8 @@ impl FlowLimit {
 
     /// Rate in Pa/s that the flow must make up for because the volume grows.
     fn displaced(&self, at: &Point) -> f64 {
-        let slope = (self.volume_growth - 2.0 * self.volume_bend * at.relative_contraction()) / REFERENCE_CONTRACTION;
+        let slope =
+            self.volume_growth * (1.0 - 2.0 * self.volume_bend * at.relative_contraction()) / REFERENCE_CONTRACTION;
         let growth = slope * at.contraction_velocity / self.volume(at);
         self.polytropic_exponent * (at.gauge_pressure + AMBIENT_PRESSURE) * growth
     }
@@ -90,7 +91,7 @@ impl FlowLimit {
     /// Volume relative to that at rest.
     fn volume(&self, at: &Point) -> f64 {
         let contraction = at.relative_contraction();
-        (1.0 + contraction * (self.volume_growth - self.volume_bend * contraction)).max(LEAST_VOLUME)
+        (1.0 + self.volume_growth * contraction * (1.0 - self.volume_bend * contraction)).max(LEAST_VOLUME)
     }
 
     fn limited(&self, at: &Point, rate: f64) -> f64 {

@@ -123,3 +123,17 @@ impl Effect for ValveLag {
         format!("The valve is slower than nominal: {}.", said.join(", and "))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pole_is_late_by_its_time_constant_on_a_ramp_however_short_it_is() {
+        for time_constant in [0.0, 2e-4, SHORTEST, 0.05] {
+            let (now, settled) = (3.0, time_constant.max(SHORTEST));
+            let out = passed(now, now - settled, time_constant);
+            assert!((now - out - time_constant).abs() < 1e-12, "{time_constant}");
+        }
+    }
+}
