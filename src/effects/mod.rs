@@ -99,8 +99,6 @@ pub enum Holds {
     Exactly,
     /// It is a law of nature, which is always simpler than nature.
     AsLaw,
-    /// It is a law, and what hangs on chance is not foretold.
-    ButForChance,
 }
 
 /// What a person needs to know of an effect.
@@ -179,6 +177,10 @@ pub trait Effect: Declared + Default {
     /// Whether its values are such as the cause can have, where [`Effect::ENDS_INSIDE`] does not say it: fits may try more.
     fn is_plausible(&self) -> bool {
         true
+    }
+    /// Whether part of what it does hangs on chance and cannot be foretold.
+    fn hangs_on_chance(&self) -> bool {
+        false
     }
     /// Has it be as it is in one of several recordings, by its number from 1, where that makes a difference to it.
     fn in_recording(&mut self, number: f64) {
@@ -360,6 +362,11 @@ macro_rules! effects {
             /// Whether the values of the effect with this name are such as its cause can have.
             pub fn is_plausible(&self, name: &str) -> bool {
                 true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible() && ends_inside(&self.$field)))*
+            }
+
+            /// Whether what the effect with this name does hangs on chance in part.
+            pub fn hang_on_chance(&self, name: &str) -> bool {
+                false $(|| $Effect::DESCRIPTION.name == name && self.$field.hangs_on_chance())*
             }
 
             /// Has all effects be as they are in one of several recordings, by its number from 1.

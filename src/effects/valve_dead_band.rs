@@ -75,7 +75,7 @@ impl Effect for ValveDeadBand {
         experiment: "slow stairs and ramps of the command, up and down, with the muscle locked",
         reference: "Choudhury et al. 2005",
         of_load: false,
-        holds: Holds::ButForChance,
+        holds: Holds::AsLaw,
         forms: &[
             &[("valve_dead_band.play", &[0.03, 0.08, 0.15])],
             // The command was raised before the recording.
@@ -101,6 +101,11 @@ impl Effect for ValveDeadBand {
 
     fn is_neutral(&self) -> bool {
         self.play == 0.0 && self.stiction == 0.0 && self.pressure_overlap == 0.0
+    }
+
+    /// A pilot that sticks ends each fast move anywhere within its threshold.
+    fn hangs_on_chance(&self) -> bool {
+        self.stiction > 0.0
     }
 
     /// A valve that opens no port near its target rests where it started.

@@ -199,9 +199,12 @@ impl Search<'_, '_> {
 
 /// Share of the error that the effects of a fit must explain: of all samples, and of those that it did not see.
 fn least_explained(fitted: &Fitted) -> (f64, f64) {
-    match fitted.hypothesis.parts.iter().map(|part| part.effect.holds).max() {
+    let parts = &fitted.hypothesis.parts;
+    if parts.iter().any(|part| fitted.parameters.effects.hang_on_chance(part.effect.name)) {
+        return LEAST_EXPLAINED_BUT_FOR_CHANCE;
+    }
+    match parts.iter().map(|part| part.effect.holds).max() {
         Some(Holds::Exactly) => LEAST_EXPLAINED_EXACTLY,
-        Some(Holds::ButForChance) => LEAST_EXPLAINED_BUT_FOR_CHANCE,
         Some(Holds::AsLaw) | None => LEAST_EXPLAINED,
     }
 }
