@@ -592,7 +592,8 @@ impl<'a> Bench<'a> {
     /// them than that (Laplace's approximation of the evidence, D. MacKay 1992, doi 10.1162/neco.1992.4.3.415).
     pub fn price(&self, fitted: &Fitted) -> f64 {
         let weights = self.data.weights_beside_structure();
-        let slopes = self.slopes_at(&fitted.parameters).unwrap_or_default();
+        // What cannot be simulated is worth nothing.
+        let Some(slopes) = self.slopes_at(&fitted.parameters) else { return f64::INFINITY };
         let expected = self.corrections.iter().zip(slopes).filter_map(|((variable, correction), slope)| {
             let (mean, deviation) = correction.prior?;
             let off = (declared(&fitted.parameters, variable.name).1 - mean) / deviation;
@@ -675,10 +676,10 @@ impl<'a> Bench<'a> {
     /// Takes back what a change does in blocks that it makes worse: where each jump hangs on the ones before, a size that is not quite right
     /// goes wrong for a while by chance.
     fn forgive(&self, base: &Fitted, change: &mut [f64]) {
-        let blocks = self.data.blocks();
-        let mut worse = vec![0.0; blocks.iter().max().map_or(0, |last| last + 1)];
-        for (block, (residual, by)) in blocks.iter().zip(weighted(&base.residuals, &self.weights).iter().zip(&*change))
-        {
+        let (blocks, count) = self.data.blocks();
+        let mut worse = vec![0.0; count];
+        let residuals = weighted(&base.residuals, &self.weights);
+        for ((block, residual), by) in blocks.iter().zip(residuals).zip(change.iter()) {
             worse[*block] += (residual + by).powi(2) - residual.powi(2);
         }
         change.iter_mut().zip(&blocks).filter(|(_, block)| worse[**block] > 0.0).for_each(|(by, _)| *by = 0.0);
@@ -687,8 +688,10 @@ impl<'a> Bench<'a> {
     /// A start with the best size nearby, where the error has many minima over it.
     pub fn settled(&self, start: &Start) -> Parameters {
         let size = start.part.size();
-        let nearby = || self.best_nearby(&start.parameters, size.0, SCANS[0]);
-        if many_minima(size) { nearby().map_or(start.parameters, |(_, model)| model) } else { start.parameters }
+        if !many_minima(size) {
+            return start.parameters;
+        }
+        self.best_nearby(&start.parameters, size.0, SCANS[0]).map_or(start.parameters, |(_, model)| model)
     }
 
     /// A model with an effect of its own exchanged for another form of it, at the start that leaves least, be it with what both
@@ -796,8 +799,7 @@ impl<'a> Bench<'a> {
 
     /// Sum over blocks of the squared gradients that each of them contributes, enlarged for how few they are.
     fn gradients(&self, columns: &[Vec<f64>], residuals: &[f64]) -> DMatrix<f64> {
-        let blocks = self.data.blocks();
-        let count = blocks.iter().max().map_or(0, |last| last + 1);
+        let (blocks, count) = self.data.blocks();
         let mut gradients = DMatrix::<f64>::zeros(columns.len(), count);
         for (k, column) in columns.iter().enumerate() {
             for ((slope, residual), block) in column.iter().zip(residuals).zip(&blocks) {
@@ -820,7 +822,7 @@ fn many_minima((_, starts): &Freed) -> bool {
     starts.len() >= MANY_STARTS
 }
 
-/// Bounds of parameters of effects; a change of the size of the start matters.
+/// Bounds of parameters of effects; a change of the size of the start matters, unless that is next to nothing.
 pub(super) fn bounds(variables: &[&'static Variable], start: &Parameters) -> Vec<Free> {
     let bounds = |variable: &&'static Variable| {
         let start = declared(start, variable.name).1;

@@ -415,8 +415,8 @@ impl<'a> Data<'a> {
         self.recordings
     }
 
-    /// Per residual, the number of its block: blocks of a few seconds of a recording, all signals together.
-    pub fn blocks(&self) -> Vec<usize> {
+    /// Per residual, the number of its block, and how many there are: blocks of a few seconds of a recording, all signals together.
+    pub fn blocks(&self) -> (Vec<usize>, usize) {
         let mut first = 0;
         let mut numbers = Vec::with_capacity(self.recordings.len());
         for recording in self.recordings {
@@ -428,7 +428,7 @@ impl<'a> Data<'a> {
             numbers.push(of_recording);
         }
         let of = |segment: &Segment| segment.samples.iter().map(|&k| numbers[segment.recording][k]).collect::<Vec<_>>();
-        self.segments.iter().flat_map(of).collect()
+        (self.segments.iter().flat_map(of).collect(), first)
     }
 
     /// Rms of each signal's residual on the samples that no fit saw, SI.

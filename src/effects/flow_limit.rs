@@ -1,4 +1,6 @@
-use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point, REFERENCE_CONTRACTION, REFERENCE_PRESSURE};
+use super::{
+    AMBIENT_PRESSURE, Description, Effect, Holds, LEAST_VOLUME, Point, REFERENCE_CONTRACTION, REFERENCE_PRESSURE,
+};
 
 /// Rate in Pa/s from which on there is no limit.
 const NONE: f64 = 1e9;
@@ -58,8 +60,6 @@ crate::variables::variables! {
 const LEAST_MISSING: f64 = 10.0;
 /// Share of the choked flow that there is at least; not physical, it keeps a limit above zero.
 const LEAST_SHARE: f64 = 1e-3;
-/// Share of the volume at rest that there is at least; not physical, it keeps the limits finite.
-const LEAST_VOLUME: f64 = 0.1;
 
 impl FlowLimit {
     fn limit(&self, at: &Point, rate: f64) -> f64 {
@@ -118,7 +118,7 @@ impl Effect for FlowLimit {
     const DESCRIPTION: Description = Description {
         name: "flow_limit",
         meaning: "filling and emptying are limited in rate",
-        equation: "r <- r/(1 + |r/m|^n)^(1/n),  m = filling or emptying",
+        equation: "r + d <- (r + d)/(1 + |(r + d)/m|^n)^(1/n),  m = filling or emptying, times V0/V;  d = kappa (p + p_a) dV/dt / V",
         signature: "ramps of the pressure after large steps, unlike up and down; small steps as nominal",
         experiment: "steps of several sizes, up and down",
         reference: "ISO 6358",

@@ -1,4 +1,4 @@
-use super::{AMBIENT_PRESSURE, Description, Effect, Holds, Point, REFERENCE_CONTRACTION};
+use super::{AMBIENT_PRESSURE, Description, Effect, Holds, LEAST_VOLUME, Point, REFERENCE_CONTRACTION};
 
 /// Ratio of pressures below which the flow through a hole is choked: a sharp edge.
 const CRITICAL_RATIO: f64 = 0.3;
@@ -87,7 +87,7 @@ impl Leakage {
     fn loss(&self, gauge_pressure: f64, contraction: f64) -> f64 {
         let opened = (contraction - self.opening_contraction).max(0.0) / REFERENCE_CONTRACTION;
         let opening = 1.0 + self.opening_with_contraction * opened;
-        let volume = (1.0 + self.volume_growth * contraction / REFERENCE_CONTRACTION).max(0.1);
+        let volume = (1.0 + self.volume_growth * contraction / REFERENCE_CONTRACTION).max(LEAST_VOLUME);
         self.rate * self.flow(gauge_pressure) * opening / volume
     }
 }

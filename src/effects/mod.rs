@@ -45,6 +45,8 @@ impl Point {
 pub const REFERENCE_PRESSURE: f64 = 2e5;
 /// Contraction in m at which sizes that change with contraction are stated.
 pub const REFERENCE_CONTRACTION: f64 = 0.1;
+/// Share of the volume at rest that a muscle has at least; not physical, it keeps what goes with one over the volume finite.
+pub const LEAST_VOLUME: f64 = 0.1;
 /// Force in N at which sizes that change with force are stated.
 pub const REFERENCE_FORCE: f64 = 400.0;
 /// Ambient pressure in Pa, for what depends on absolute pressure.
@@ -365,7 +367,7 @@ macro_rules! effects {
             }
 
             /// Whether what the effect with this name does hangs on chance in part.
-            pub fn hang_on_chance(&self, name: &str) -> bool {
+            pub fn hangs_on_chance(&self, name: &str) -> bool {
                 false $(|| $Effect::DESCRIPTION.name == name && self.$field.hangs_on_chance())*
             }
 

@@ -98,7 +98,7 @@ impl Effect for TemperatureDrift {
     const DESCRIPTION: Description = Description {
         name: "temperature_drift",
         meaning: "slow change while the muscle, its valve or a sensor warms up",
-        equation: "tau_i dw_i/dt = 1 - k + k |P|/(10 W) - w_i;  w = (1 - s) w_1 + s w_2;  A <- A (1 + a w);  F_e <- F_e (1 + e w);  u <- u (1 + v w);  F_measured <- F_measured + f w;  p_measured <- p_measured + q w",
+        equation: "tau_i dw_i/dt = 1 - k + k ((1 - m) |P|/(10 W) + m |v|/(0.1 m/s)) - w_i;  w = (1 - s) w_1 + s w_2;  A <- A (1 + a w);  F_e <- F_e (1 + e w);  u <- u (1 + v w);  F_measured <- F_measured + f w;  p_measured <- p_measured + q w",
         signature: "force residual that grows from zero and stays: the first cycle differs from the last",
         experiment: "the same cycle for several minutes, from cold",
         reference: "definition",

@@ -200,7 +200,7 @@ impl Search<'_, '_> {
 /// Share of the error that the effects of a fit must explain: of all samples, and of those that it did not see.
 fn least_explained(fitted: &Fitted) -> (f64, f64) {
     let parts = &fitted.hypothesis.parts;
-    if parts.iter().any(|part| fitted.parameters.effects.hang_on_chance(part.effect.name)) {
+    if parts.iter().any(|part| fitted.parameters.effects.hangs_on_chance(part.effect.name)) {
         return LEAST_EXPLAINED_BUT_FOR_CHANCE;
     }
     match parts.iter().map(|part| part.effect.holds).max() {
