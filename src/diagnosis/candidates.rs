@@ -126,6 +126,11 @@ impl Part {
         self.form >= self.effect.forms.len()
     }
 
+    /// Whether the error of its form has many minima over its size.
+    pub fn has_many_minima(self) -> bool {
+        many_minima(self.size())
+    }
+
     /// The parameter of its form that stands for its size.
     fn size(self) -> &'static Freed {
         &self.in_form()[0]
@@ -397,6 +402,12 @@ impl<'a> Bench<'a> {
         self.recent = Mutex::default(); // the start is in doubt as the noise has it
     }
 
+    /// A fit with its residuals as the noise that is known now has them; `None` where it cannot be simulated.
+    pub fn anew(&self, fitted: &Fitted) -> Option<Fitted> {
+        let residuals = self.residuals(&fitted.parameters)?;
+        Some(Fitted { losses: self.data.losses(&residuals, Scope::All), residuals, ..fitted.clone() })
+    }
+
     /// [`Data::residuals`] of a model. A fit starts from where another one did or ended: one simulation in eight is known.
     fn residuals(&self, model: &Parameters) -> Option<Vec<f64>> {
         let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
@@ -656,7 +667,7 @@ impl<'a> Bench<'a> {
             Some(weighted(&change, &self.weights))
         };
         let mut whole = change(&parameters)?;
-        if many_minima(part.size()) {
+        if part.has_many_minima() {
             self.forgive(base, &mut whole);
         }
         // What shows nothing at a usual size cannot be told from nothing.

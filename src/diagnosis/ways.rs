@@ -125,7 +125,9 @@ impl Found<'_> {
         }
         let hypothesis = shared.parts.iter().fold(own.hypothesis.clone(), |all, part| all.in_form_of(*part));
         let without = shared.parts.iter().fold(own.parameters, |model, part| neutralised(&model, part.effect));
-        self.bench.exact_fit(&hypothesis, &shared.at_work_in(&without, &others.parameters), Scope::All)
+        let start = shared.at_work_in(&without, &others.parameters);
+        let fit = self.bench.exact_fit(&hypothesis, &start, Scope::All)?;
+        (!hypothesis.is_impossible(&fit.parameters)).then_some(fit)
     }
 
     /// The odds against one fit of the other way; the likelihoods are those of the other one's data.

@@ -26,8 +26,9 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// A stand-in for ISO 6358: choked inflow gives a constant rate, choked outflow one in proportion to absolute
-    /// pressure; the roundness in between is no physical constant. With a pressure of the supply and an exponent (1 isothermal, 1.4
-    /// adiabatic) it is the standard itself. A long narrow hose with turbulent flow lets through what goes with the root of the difference in
+    /// pressure; the roundness in between is no physical constant. With a pressure of the supply it is the standard itself for a muscle that
+    /// rests, and for one that moves with the exponent of its air, 1 isothermal; of other air the rates hold only nearly. The limits are
+    /// those of a muscle at its initial length. A long narrow hose with turbulent flow lets through what goes with the root of the difference in
     /// pressure, `exponent` 0.5.
     ///
     /// # Reference
@@ -41,10 +42,10 @@ crate::variables::variables! {
         roundness: f64 = 0.0, ONE, (0.0..=1.0);
         /// Share of the emptying that is in proportion to absolute pressure
         emptying_with_pressure: f64 = 0.0, ONE, (0.0..=1.0);
-        /// Relative growth of the volume at 0.1 m of contraction
-        volume_growth: f64 = 0.0, ONE, (0.0..=3.0);
+        /// Relative growth of the volume at 0.1 m of contraction along its slope at rest
+        volume_growth: f64 = 0.0, ONE, (0.0..=10.0);
         /// By which share it grows less than along a straight line there
-        volume_bend: f64 = 0.0, ONE, (0.0..=0.2);
+        volume_bend: f64 = 0.0, ONE, (0.0..=1.0);
         /// Polytropic exponent of the air that the muscle displaces as it moves; that needs no flow for 0
         polytropic_exponent: f64 = 0.0, ONE, (0.0..=2.0);
         /// Power of the missing pressure, in bar, with which the limits grow
@@ -72,7 +73,7 @@ impl FlowLimit {
             (false, true) => self.emptying * relative * self.share_of_choked(AMBIENT_PRESSURE / absolute),
             (false, false) => self.emptying * (1.0 + self.emptying_with_pressure * (relative - 1.0)),
         };
-        let most = most / self.volume(at);
+        let most = most / self.volume(at).0;
         if self.exponent == 0.0 {
             return most;
         }
@@ -82,16 +83,20 @@ impl FlowLimit {
 
     /// Rate in Pa/s that the flow must make up for because the volume grows.
     fn displaced(&self, at: &Point) -> f64 {
-        let slope =
-            self.volume_growth * (1.0 - 2.0 * self.volume_bend * at.relative_contraction()) / REFERENCE_CONTRACTION;
-        let growth = slope * at.contraction_velocity / self.volume(at);
+        let (volume, slope) = self.volume(at);
+        let growth = slope / volume * at.contraction_velocity;
         self.polytropic_exponent * (at.gauge_pressure + AMBIENT_PRESSURE) * growth
     }
 
-    /// Volume relative to that at rest.
-    fn volume(&self, at: &Point) -> f64 {
+    /// Volume relative to that at rest, and what it grows by per metre of contraction.
+    fn volume(&self, at: &Point) -> (f64, f64) {
         let contraction = at.relative_contraction();
-        (1.0 + self.volume_growth * contraction * (1.0 - self.volume_bend * contraction)).max(LEAST_VOLUME)
+        let bend = self.volume_bend * contraction;
+        let volume = 1.0 + self.volume_growth * contraction * (1.0 - bend);
+        if volume < LEAST_VOLUME {
+            return (LEAST_VOLUME, 0.0);
+        }
+        (volume, self.volume_growth * (1.0 - 2.0 * bend) / REFERENCE_CONTRACTION)
     }
 
     fn limited(&self, at: &Point, rate: f64) -> f64 {

@@ -64,6 +64,11 @@ impl ValveDeadBand {
     fn overlap_of_emptying(&self) -> f64 {
         self.pressure_overlap * (1.0 + self.emptying_excess)
     }
+
+    /// Whether a pilot that has broken loose goes on until the command turns.
+    fn slides(&self) -> bool {
+        self.sliding_speed < Self::default().sliding_speed
+    }
 }
 
 impl Effect for ValveDeadBand {
@@ -103,9 +108,9 @@ impl Effect for ValveDeadBand {
         self.play == 0.0 && self.stiction == 0.0 && self.pressure_overlap == 0.0
     }
 
-    /// A pilot that sticks ends each fast move anywhere within its threshold.
+    /// A pilot that sticks ends each fast move anywhere within its threshold; one that slides goes on to its end.
     fn hangs_on_chance(&self) -> bool {
-        self.stiction > 0.0
+        self.stiction > 0.0 && !self.slides()
     }
 
     /// A valve that opens no port near its target rests where it started.
@@ -139,8 +144,7 @@ impl Effect for ValveDeadBand {
         }
         if self.stiction > 0.0 {
             let off = if self.play > 0.0 { "beyond it by" } else { "off by" };
-            let slides = self.sliding_speed < Self::default().sliding_speed;
-            let then = if slides { " and slides until it turns" } else { "" };
+            let then = if self.slides() { " and slides until it turns" } else { "" };
             parts.push(format!("its pilot sticks until the command is {off} {:.0} mV{then}", 1e3 * self.stiction));
         }
         if self.pressure_overlap > 0.0 {
@@ -151,5 +155,20 @@ impl Effect for ValveDeadBand {
             parts.push(format!("no port opens for errors below {:.3} bar{emptying}", 1e-5 * self.pressure_overlap));
         }
         format!("The valve ignores small changes of the command: {}.", parts.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_pilot_that_sticks_again_at_once_is_left_to_chance() {
+        let of = |play, stiction, sliding_speed| {
+            ValveDeadBand { play, stiction, sliding_speed, ..ValveDeadBand::default() }.hangs_on_chance()
+        };
+        assert!(of(0.0, 0.1, 1e9));
+        assert!(!of(0.0, 0.1, 1e-3));
+        assert!(!of(0.1, 0.0, 1e9));
     }
 }

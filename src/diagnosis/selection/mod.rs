@@ -150,13 +150,9 @@ impl<'a, 'b> Search<'a, 'b> {
     fn judged_anew(&mut self, fits: Vec<Judged>) -> Vec<Judged> {
         let Some(first) = fits.first() else { return fits };
         self.bench.refine_noise(&first.fitted.residuals);
-        let anew = |mut fitted: Fitted| {
-            fitted.losses = self.bench.data.losses(&fitted.residuals, Scope::All);
-            fitted
-        };
-        let baseline = anew(self.baseline.clone());
-        let fits: Vec<Fitted> = fits.into_iter().map(|judged| anew(judged.fitted)).collect();
-        self.baseline = baseline;
+        let baseline = self.bench.anew(&self.baseline);
+        let fits: Vec<_> = fits.into_par_iter().filter_map(|judged| self.bench.anew(&judged.fitted)).collect();
+        self.baseline = baseline.unwrap_or_else(|| self.baseline.clone());
         sorted(fits.into_iter().map(|fitted| self.judge(fitted)).collect())
     }
 
@@ -192,7 +188,7 @@ impl<'a, 'b> Search<'a, 'b> {
         starts.truncate(equal.clamp(most, 2 * most));
         let best = |starts: Vec<Start>| {
             let also = ALSO_PROMISING * starts[0].promise;
-            let fits = distinct(&starts).take(STARTS).filter(|start| start.promise >= also).filter_map(|start| {
+            let fits = worth_fitting(&starts).filter(|start| start.promise >= also).filter_map(|start| {
                 let from = self.bench.settled(start);
                 Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &from)?))
             });
@@ -383,6 +379,13 @@ fn distinct(starts: &[Start]) -> impl Iterator<Item = &Start> {
         .enumerate()
         .filter(move |(k, start)| !starts[..*k].iter().any(|known| same(known, start)))
         .map(|(_, s)| s)
+}
+
+/// Starts of an effect from which it is fitted. Those of forms with many minima are chosen among themselves: what these promise leaves out
+/// what they make worse.
+fn worth_fitting(starts: &[Start]) -> impl Iterator<Item = &Start> {
+    let of_kind = |many: bool| distinct(starts).filter(move |start| start.part.has_many_minima() == many).take(STARTS);
+    of_kind(false).chain(of_kind(true))
 }
 
 /// From where each effect is best fitted.
