@@ -371,6 +371,7 @@ fn effects_agree_with_scipy() {
             &[
                 ("friction_hysteresis.half_width", 9.0),
                 ("friction_hysteresis.half_width_per_pull", 0.04),
+                ("friction_hysteresis.with_contraction", -0.6),
                 ("friction_hysteresis.smoothing_velocity", 2e-3),
             ],
         ),

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, of_recording};
+use super::{Description, Effect, Holds, Point, REFERENCE_CONTRACTION, REFERENCE_FORCE, of_recording};
 
 /// Smallest velocity in m/s over which a friction without a loop changes its sign.
 const LEAST_SMOOTHING: f64 = 2e-4;
@@ -10,9 +10,9 @@ crate::variables::variables! {
     /// Dry friction between threads and rubber: a loss that depends on the way, not on its speed.
     ///
     /// # Model
-    /// F ← F − (w₀ + w₁ p + μ |F|) h (1 + c exp(−(v/v_s)²)), with the loop h = (1 − m) z₁ + m z₂ of two elements that pass it
+    /// F ← F − (w₀ + w₁ p + μ |F|) (1 + b (x/0.1 m − 1)) h (1 + c exp(−(v/v_s)²)), with the loop h = (1 − m) z₁ + m z₂ of two elements that pass it
     /// within the displacements s and r s: s dz/dx = 1 − (γ sgn(v z) + 1 − γ) |z|ⁿ. `half_width` w₀,
-    /// `half_width_per_pressure` w₁, `half_width_per_pull` μ, `presliding_displacement` s, `second_share` m, `second_ratio` r, `knee` n,
+    /// `half_width_per_pressure` w₁, `half_width_per_pull` μ, `with_contraction` b, `presliding_displacement` s, `second_share` m, `second_ratio` r, `knee` n,
     /// `unloading` γ, `stribeck_share` c, `stribeck_velocity` v_s. n = γ = 1 is the law of Dahl. Both z stay within ±1. With a
     /// `smoothing_velocity` v₀ it is Coulomb's law without a memory, h = tanh(v/v₀). A hanging load starts in balance with h at
     /// `start`, by `second_start` and `third_start` more in these recordings.
@@ -38,6 +38,8 @@ crate::variables::variables! {
         half_width_per_pressure: f64 = 0.0, SQUARE_METRE, (0.0..=1e-3);
         /// Growth of the half width with the pull, as of a cord around a bolt
         half_width_per_pull: f64 = 0.0, ONE, (0.0..=0.5);
+        /// Relative growth of the half width with contraction, at 0.1 m: the threads cross at another angle there
+        with_contraction: f64 = 0.0, ONE, (-1.0..=1.0);
         /// Displacement after a reversal at which most of the loop is passed
         presliding_displacement: f64 = 2e-3, METRE, (1e-5..=0.1);
         /// Share of the second element in the loop
@@ -66,9 +68,11 @@ crate::variables::variables! {
 }
 
 impl FrictionHysteresis {
-    fn width(&self, gauge_pressure: f64, pull: f64) -> f64 {
-        let of_pressure = self.half_width + self.half_width_per_pressure * gauge_pressure.max(0.0);
-        of_pressure + self.half_width_per_pull * pull.abs()
+    fn width(&self, at: &Point, pull: f64) -> f64 {
+        let of_pressure = self.half_width + self.half_width_per_pressure * at.gauge_pressure.max(0.0);
+        let place = 1.0 + self.with_contraction * (at.relative_contraction() - 1.0);
+        // A friction that would drive the muscle is none.
+        (of_pressure + self.half_width_per_pull * pull.abs()) * place.max(0.0)
     }
 
     /// Share of the half width that acts at the start of the recording that is simulated, with its sign.
@@ -106,7 +110,7 @@ impl Effect for FrictionHysteresis {
     const DESCRIPTION: Description = Description {
         name: "friction_hysteresis",
         meaning: "dry friction in the braid: a loss that does not depend on speed",
-        equation: "F <- F - (w0 + w1 p + mu |F|) h (1 + c exp(-(v/v_s)^2)),  h of two elements s dz/dx = 1 - z sgn(v), or h = tanh(v/v0)",
+        equation: "F <- F - (w0 + w1 p + mu |F|) (1 + b (x/x0 - 1)) h (1 + c exp(-(v/v_s)^2)),  h of two elements s dz/dx = 1 - z sgn(v), or h = tanh(v/v0)",
         signature: "force residual changes sign at reversals, width independent of speed",
         experiment: "triangles of shrinking amplitude at three pressures",
         reference: "Dahl 1968; Wen 1976; Andersson et al. 2007; thesis eq. 4.20",
@@ -132,6 +136,7 @@ impl Effect for FrictionHysteresis {
             ("friction_hysteresis.unloading", &[0.7]),
             ("friction_hysteresis.stribeck_share", &[0.1]),
             ("friction_hysteresis.half_width_per_pull", &[0.01]),
+            ("friction_hysteresis.with_contraction", &[0.3, -0.3]),
             ("friction_hysteresis.start", &[0.3, -0.3]),
             ("friction_hysteresis.second_start", &[0.3, -0.3]),
             ("friction_hysteresis.third_start", &[0.3, -0.3]),
@@ -168,11 +173,12 @@ impl Effect for FrictionHysteresis {
             return force;
         }
         let engaged = self.engaged(at.contraction_velocity, own);
-        force - self.width(at.gauge_pressure, force) * engaged * self.stribeck(at.contraction_velocity)
+        force - self.width(at, force) * engaged * self.stribeck(at.contraction_velocity)
     }
 
     fn sentence(&self) -> String {
-        let loop_width = 2.0 * self.width(3e5, REFERENCE_FORCE);
+        let usual = Point { gauge_pressure: 3e5, contraction: REFERENCE_CONTRACTION, ..Point::default() };
+        let loop_width = 2.0 * self.width(&usual, REFERENCE_FORCE);
         let depends_on_pull = 2.0 * self.half_width_per_pull * REFERENCE_FORCE > 0.5;
         let pull = if depends_on_pull { format!(" and {REFERENCE_FORCE:.0} N") } else { String::new() };
         format!(

@@ -690,11 +690,11 @@ class SinkingFriction(DirectFriction):
 
 
 class CordFriction(Plant):
-    """Coulomb's law without a memory; a part goes with the pull, as of a cord around a bolt."""
+    """Coulomb's law without a memory; a part goes with the pull, as of a cord around a bolt, and all of it with the way."""
 
     def force(self, pressure, x, velocity, own):
         pull = super().force(pressure, x, velocity, own)
-        return pull - (9 + 0.04 * abs(pull)) * np.tanh(velocity / 2e-3)
+        return pull - (9 + 0.04 * abs(pull)) * (1 - 0.6 * (x / 0.1 - 1)) * np.tanh(velocity / 2e-3)
 
 
 STAIRS = staircase([0.8, 1.5, 2.0, 1.2], 1.2)
