@@ -213,10 +213,10 @@ impl<'a, 'b> Search<'a, 'b> {
         now < self.most && is_worth && !self.is_sound(&self.baseline.losses) && !self.unlisted_says_all(levels)
     }
 
-    /// Whether residuals are small enough to be those of forms, which are never known exactly.
+    /// Whether residuals are small enough to be those of forms, which are never known exactly, or of a sound model.
     fn may_be_form(&self, losses: &[Loss]) -> bool {
         let before = beyond_noise(&self.baseline.losses);
-        leaves_at_most(losses, |signal| left_by_form(before[&signal]))
+        leaves_at_most(losses, |signal| left_by_form(before[&signal]).max(left_by_structure(signal, &self.bench.data)))
     }
 
     /// Share of what a hypothesis leaves that another one explains, in the signals in which it leaves more than forms may; where
