@@ -2,11 +2,11 @@
 //!
 //! # Model
 //! Levenberg–Marquardt on Σ r², each step the minimum of the damped quadratic within the bounds. Derivatives are forward
-//! differences, taken in parallel; those of parameters that act almost linearly may be given and cost nothing then. A
-//! prior counts as one more residual.
+//! differences, taken in parallel. Those of some parameters may be given: they cost nothing then, and are only updated from what
+//! steps do. A prior counts as one more residual.
 //!
 //! # Reference
-//! D. Marquardt (1963), doi 10.1137/0111030; bounds by active sets, as in J. Nocedal, S. Wright (2006), Numerical
+//! D. Marquardt (1963), doi 10.1137/0111030; updates: C. Broyden (1965), doi 10.1090/S0025-5718-1965-0198670-6; bounds by active sets, as in J. Nocedal, S. Wright (2006), Numerical
 //! Optimization, algorithm 16.3. Own code because `levenberg-marquardt` 0.15 has no bounds.
 
 use nalgebra::{DMatrix, DVector};
@@ -76,8 +76,8 @@ const TRIALS: usize = 5;
 struct Problem<'a, R> {
     residuals: &'a R,
     free: &'a [Free],
-    /// Derivatives of the residuals by the last parameters, as far as they are known.
-    known: &'a [Vec<f64>],
+    /// How many of the parameters, the first ones, have derivatives that are not known.
+    unknown: usize,
 }
 
 /// A place with its residuals.
@@ -93,15 +93,17 @@ pub fn fit<R>(residuals: &R, free: &[Free], known: &[Vec<f64>], effort: Effort) 
 where
     R: Fn(&[f64]) -> Option<Vec<f64>> + Sync,
 {
-    let problem = Problem { residuals, free, known };
+    let problem = Problem { residuals, free, unknown: free.len() - known.len() };
     let start: Vec<f64> = free.iter().map(|f| f.start.clamp(f.lower, f.upper)).collect();
     let Some(mut current) = problem.place(&start) else {
         return Fit { parameters: start, residuals: Vec::new(), cost: f64::INFINITY, ended: Ended::NoStart };
     };
+    let mut columns = vec![Vec::new(); problem.unknown];
+    columns.extend(known.iter().zip(&free[problem.unknown..]).map(|(slope, free)| scaled(slope, free.typical)));
     let mut damping = 1e-3;
     let mut ended = Ended::IterationLimit;
     for _ in 0..effort.iterations {
-        let columns = problem.columns(&current);
+        problem.look(&mut columns, &current);
         let (normal, gradient) = problem.normal_equations(&columns, &current);
         let least = effort.small_decrease * current.cost;
         let Some(better) = problem.better(&normal, &gradient, &current, &mut damping, least) else {
@@ -109,6 +111,12 @@ where
             break;
         };
         let decrease = current.cost - better.cost;
+        update(
+            &mut columns,
+            &problem.step_between(&current.parameters, &better.parameters),
+            &current.residuals,
+            &better.residuals,
+        );
         current = better;
         if decrease <= least {
             ended = Ended::Converged;
@@ -152,15 +160,13 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
         Some(Place { parameters: parameters.to_vec(), residuals, cost })
     }
 
-    /// ∂r/∂parameter times the typical change, one column per parameter.
-    fn columns(&self, at: &Place) -> Vec<Vec<f64>> {
-        let unknown = &self.free[..self.free.len() - self.known.len()];
-        let mut columns = derivatives(self.residuals, unknown, &at.parameters, &at.residuals);
-        columns.extend(self.known.iter().cloned());
-        for (column, free) in columns.iter_mut().zip(self.free) {
-            column.iter_mut().for_each(|value| *value *= free.typical);
+    /// Takes the derivatives that are not known anew at a place, times the typical changes; one column per parameter.
+    fn look(&self, columns: &mut [Vec<f64>], at: &Place) {
+        let unknown = &self.free[..self.unknown];
+        let derivatives = derivatives(self.residuals, unknown, &at.parameters, &at.residuals);
+        for ((column, derivative), free) in columns.iter_mut().zip(derivatives).zip(unknown) {
+            *column = scaled(&derivative, free.typical);
         }
-        columns
     }
 
     /// JᵀJ and Jᵀr, with parameters in their typical sizes.
@@ -201,11 +207,32 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
         None
     }
 
+    /// The way from some parameters to others, in their typical sizes.
+    fn step_between(&self, from: &[f64], to: &[f64]) -> DVector<f64> {
+        DVector::from_fn(from.len(), |k, _| (to[k] - from[k]) / self.free[k].typical)
+    }
+
     /// Decrease of the cost that the derivatives promise for a step.
     fn expected_decrease(&self, normal: &DMatrix<f64>, gradient: &DVector<f64>, from: &Place, trial: &[f64]) -> f64 {
-        let step = DVector::from_fn(trial.len(), |k, _| (trial[k] - from.parameters[k]) / self.free[k].typical);
+        let step = self.step_between(&from.parameters, trial);
         -2.0 * gradient.dot(&step) - (normal * &step).dot(&step)
     }
+}
+
+/// Changes derivatives by as little as makes them promise what a step did.
+fn update(columns: &mut [Vec<f64>], step: &DVector<f64>, before: &[f64], after: &[f64]) {
+    let mut missed: Vec<f64> = after.iter().zip(before).map(|(after, before)| after - before).collect();
+    for (column, by) in columns.iter().zip(step.iter()) {
+        missed.iter_mut().zip(column).for_each(|(missed, slope)| *missed -= slope * by);
+    }
+    for (column, by) in columns.iter_mut().zip(step.iter()) {
+        let share = by / step.norm_squared();
+        column.iter_mut().zip(&missed).for_each(|(slope, missed)| *slope += share * missed);
+    }
+}
+
+fn scaled(values: &[f64], by: f64) -> Vec<f64> {
+    values.iter().map(|value| value * by).collect()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -370,8 +370,20 @@ pub fn corrections(nominal: &Parameters, tolerance: f64, off: Off) -> Vec<(&'sta
     relative.chain(shapes).collect()
 }
 
-/// Change of the residuals per unit of each correction.
-pub type Slopes = Vec<Vec<f64>>;
+/// What parameters do to the residuals of a model.
+#[derive(Default)]
+pub struct Slopes {
+    of: Vec<&'static Variable>,
+    /// Change of the residuals per unit of each.
+    by: Vec<Vec<f64>>,
+}
+
+impl Slopes {
+    /// That of one parameter, where it is known.
+    fn of(&self, variable: &Variable) -> Option<&Vec<f64>> {
+        self.of.iter().position(|known| known.name == variable.name).map(|k| &self.by[k])
+    }
+}
 
 /// What fits of all hypotheses have in common.
 pub struct Bench<'a> {
@@ -380,7 +392,7 @@ pub struct Bench<'a> {
     nominal: &'a Parameters,
     /// Corrections with their bounds and priors.
     corrections: Vec<(&'static Variable, Free)>,
-    /// At the baseline; empty before it is known.
+    /// Of the corrections at the baseline; empty before it is known.
     slopes: Slopes,
     weights: Vec<f64>,
     /// Models that were simulated last, with what [`Data::residuals`] gives for them.
@@ -392,7 +404,7 @@ impl<'a> Bench<'a> {
     pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64, off: Off) -> Self {
         let corrections = corrections(nominal, tolerance, off);
         let weights = data.weights(Scope::All);
-        Self { data, nominal, corrections, slopes: Vec::new(), weights, recent: Mutex::default() }
+        Self { data, nominal, corrections, slopes: Slopes::default(), weights, recent: Mutex::default() }
     }
 
     /// Takes what a better model shows of the noise.
@@ -428,7 +440,7 @@ impl<'a> Bench<'a> {
     pub fn baseline(&mut self) -> Option<Fitted> {
         let nominal = Hypothesis::default();
         let first = self.exact_fit(&nominal, self.nominal, Scope::All)?;
-        self.slopes = self.slopes_at(&first.parameters)?;
+        self.slopes = self.slopes(&first)?;
         self.fit(&nominal, &first.parameters, Scope::All, &self.slopes, EXACT)
     }
 
@@ -440,7 +452,7 @@ impl<'a> Bench<'a> {
         self.rough_fit_with(&self.slopes, hypothesis, start)
     }
 
-    /// The same with slopes from nearby.
+    /// The same with slopes from nearby, be it also of parameters of effects: an iteration costs one simulation per other parameter.
     pub fn rough_fit_with(&self, slopes: &Slopes, hypothesis: &Hypothesis, start: &Parameters) -> Option<Fitted> {
         self.fit(hypothesis, start, Scope::All, slopes, ROUGH)
     }
@@ -453,7 +465,7 @@ impl<'a> Bench<'a> {
         let mut best: Option<(Fitted, f64)> = None;
         for _ in 0..MOST_ROUNDS {
             let from = best.as_ref().map_or(*start, |(fitted, _)| fitted.parameters);
-            let slopes = self.slopes_at(&from)?;
+            let slopes = self.slopes_at(&Hypothesis::default(), &from)?;
             let fitted = self.fit(hypothesis, &from, scope, &slopes, EXACT)?;
             let cost = cost(&fitted.residuals, &self.data.weights(scope));
             let before = best.as_ref().map_or(f64::INFINITY, |(_, cost)| *cost);
@@ -537,14 +549,19 @@ impl<'a> Bench<'a> {
         hypothesis: &Hypothesis,
         start: &Parameters,
         scope: Scope,
-        slopes: &[Vec<f64>],
+        slopes: &Slopes,
         effort: Effort,
     ) -> Option<Fitted> {
         let (variables, free) = self.everything_free(hypothesis, start);
+        // Those whose slopes are known last.
+        let mut each: Vec<_> = variables.into_iter().zip(free).collect();
+        each.sort_by_key(|(variable, _)| slopes.of(variable).is_some());
+        let (variables, free): (Vec<_>, Vec<_>) = each.into_iter().unzip();
         let weights = self.data.weights(scope);
         let residuals =
             |values: &[f64]| Some(weighted(&self.residuals(&with_values(self.nominal, &variables, values))?, &weights));
-        let known: Vec<Vec<f64>> = slopes.iter().map(|slope| weighted(slope, &weights)).collect();
+        let known = variables.iter().filter_map(|variable| slopes.of(variable)).map(|slope| weighted(slope, &weights));
+        let known: Vec<Vec<f64>> = known.collect();
         let fit = least_squares::fit(&residuals, &free, &known, effort);
         if fit.ended == Ended::NoStart {
             return None;
@@ -568,7 +585,7 @@ impl<'a> Bench<'a> {
         let weights = self.data.weights(scope);
         let taken_off: Vec<f64> = course.iter().map(|by| -by).collect();
         let known: Vec<Vec<f64>> =
-            [&taken_off].into_iter().chain(&self.slopes).map(|slope| weighted(slope, &weights)).collect();
+            [&taken_off].into_iter().chain(&self.slopes.by).map(|slope| weighted(slope, &weights)).collect();
         let fit =
             least_squares::fit(&|values: &[f64]| Some(weighted(&beside(values)?, &weights)), &free, &known, EXACT);
         if fit.ended == Ended::NoStart {
@@ -604,8 +621,8 @@ impl<'a> Bench<'a> {
     pub fn price(&self, fitted: &Fitted) -> f64 {
         let weights = self.data.weights_beside_structure();
         // What cannot be simulated is worth nothing.
-        let Some(slopes) = self.slopes_at(&fitted.parameters) else { return f64::INFINITY };
-        let expected = self.corrections.iter().zip(slopes).filter_map(|((variable, correction), slope)| {
+        let Some(slopes) = self.slopes_at(&Hypothesis::default(), &fitted.parameters) else { return f64::INFINITY };
+        let expected = self.corrections.iter().zip(slopes.by).filter_map(|((variable, correction), slope)| {
             let (mean, deviation) = correction.prior?;
             let off = (declared(&fitted.parameters, variable.name).1 - mean) / deviation;
             Some((off, weighted(&slope, &weights).into_iter().map(|slope| slope * deviation).collect()))
@@ -614,13 +631,19 @@ impl<'a> Bench<'a> {
         price(&off, &columns)
     }
 
-    /// What the corrections do to the residuals of a model; `None` where it cannot be simulated.
-    pub fn slopes_at(&self, model: &Parameters) -> Option<Slopes> {
+    /// What the parameters of a fit, corrections among them, do to its residuals; `None` where it cannot be simulated.
+    pub fn slopes(&self, fitted: &Fitted) -> Option<Slopes> {
+        self.slopes_at(&fitted.hypothesis, &fitted.parameters)
+    }
+
+    /// What the parameters of a hypothesis, corrections among them, do to the residuals of a model.
+    fn slopes_at(&self, hypothesis: &Hypothesis, model: &Parameters) -> Option<Slopes> {
         let here = self.residuals(model)?;
-        let (variables, free): (Vec<_>, Vec<_>) = self.corrections.iter().copied().unzip();
-        let at: Vec<f64> = variables.iter().map(|variable| declared(model, variable.name).1).collect();
-        let residuals = |values: &[f64]| self.residuals(&with_values(model, &variables, values));
-        Some(derivatives(&residuals, &free, &at, &here))
+        let (of, free) = self.everything_free(hypothesis, model);
+        let at: Vec<f64> = free.iter().map(|free| free.start).collect();
+        let residuals = |values: &[f64]| self.residuals(&with_values(model, &of, values));
+        let by = derivatives(&residuals, &free, &at, &here);
+        Some(Slopes { of, by })
     }
 
     fn fitted(&self, hypothesis: &Hypothesis, parameters: Parameters, residuals: Vec<f64>) -> Fitted {
@@ -733,7 +756,7 @@ impl<'a> Bench<'a> {
         let residuals = weighted(&base.residuals, &self.weights);
         let scale = Free { start: 0.0, lower: -5.0, upper: 5.0, typical: 1.0, prior: None };
         let (mut free, mut columns) = (vec![scale; changes.len()], changes);
-        for ((variable, correction), slope) in self.corrections.iter().zip(&self.slopes) {
+        for ((variable, correction), slope) in self.corrections.iter().zip(&self.slopes.by) {
             free.push(correction.from(declared(&base.parameters, variable.name).1));
             columns.push(weighted(slope, &self.weights));
         }

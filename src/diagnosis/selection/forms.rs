@@ -135,8 +135,8 @@ impl Search<'_, '_> {
             vec![fully]
         };
         ways.dedup(); // where there is none
-        // What hangs on details hangs on what the corrections do here, too.
-        let Some(slopes) = self.bench.slopes_at(&judged.fitted.parameters) else { return judged };
+        // What hangs on details hangs on what all else does here, too.
+        let Some(slopes) = self.bench.slopes(&judged.fitted) else { return judged };
         let refined_by = |ways: Vec<Refined>| -> Vec<Judged> {
             ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes)).collect()
         };

@@ -6,7 +6,7 @@ mod makeshift;
 mod naming;
 
 use super::Verdict;
-use super::candidates::{Bench, Fitted, Part, Start, has_many_minima, neutralised};
+use super::candidates::{Bench, Fitted, Part, Slopes, Start, has_many_minima, neutralised};
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
@@ -22,6 +22,8 @@ const LEAST_FURTHER: f64 = 0.8;
 const LEAST_OF_FORM: f64 = 0.9;
 /// The same before the hypothesis is refined: fits of two effects that came to be named began at 0.87 and more.
 const MAY_GO_FURTHER: f64 = 0.5;
+/// The same before what the effects so far do is looked at anew.
+const MAY_COME_FURTHER: f64 = 0.2;
 /// Variance, relative to that of the noise, that an effect must take off where what is left without it may be the form of another one, or
 /// coefficients that are off: what is less than the noise itself says nothing of a cause.
 const LEAST_BESIDE_OTHERS: f64 = 1.0;
@@ -186,15 +188,25 @@ impl<'a, 'b> Search<'a, 'b> {
         let as_good = AS_PROMISING * starts.first().map_or(0.0, |best| best[0].promise);
         let equal = starts.iter().take_while(|starts| starts[0].promise >= as_good).count();
         starts.truncate(equal.clamp(most, 2 * most));
+        let Some(slopes) = self.bench.slopes(base) else { return Vec::new() };
+        let base = self.judge(base.clone());
         let best = |starts: Vec<Start>| {
             let also = ALSO_PROMISING * starts[0].promise;
-            let fits = worth_fitting(&starts).filter(|start| start.promise >= also).filter_map(|start| {
-                let from = self.bench.settled(start);
-                Some(self.judge(self.bench.rough_fit(&base.hypothesis.with(start.part), &from)?))
-            });
-            fits.max_by(|a, b| a.score.total_cmp(&b.score))
+            let from = worth_fitting(&starts).filter(|start| start.promise >= also);
+            from.filter_map(|start| self.fitted_from(&base, start, &slopes)).max_by(|a, b| a.score.total_cmp(&b.score))
         };
         sorted(starts.into_par_iter().filter_map(best).collect())
+    }
+
+    /// A fit of what a base has and one effect more: first with what the base does to the residuals taken as known, and anew where that
+    /// looks as if it might be worth it.
+    fn fitted_from(&self, base: &Judged, start: &Start, slopes: &Slopes) -> Option<Judged> {
+        let hypothesis = base.fitted.hypothesis.with(start.part);
+        let first = self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &self.bench.settled(start))?);
+        if base.fitted.hypothesis.parts.is_empty() || self.further(base, &first) < MAY_COME_FURTHER {
+            return Some(first);
+        }
+        self.bench.rough_fit(&hypothesis, &first.fitted.parameters).map(|fitted| self.judge(fitted))
     }
 
     /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect; or whether no single
