@@ -342,6 +342,28 @@ mod tests {
     }
 
     #[test]
+    fn updated_derivatives_promise_what_the_step_did() {
+        let mut columns = vec![vec![1.0, 2.0, -1.0], vec![0.5, 0.0, 3.0]];
+        let (step, before, after) = (DVector::from_vec(vec![0.3, -0.7]), [1.0, 1.0, 1.0], [0.2, 1.5, -0.4]);
+        update(&mut columns, &step, &before, &after);
+        for k in 0..3 {
+            let promised = before[k] + columns[0][k] * step[0] + columns[1][k] * step[1];
+            assert!((promised - after[k]).abs() < 1e-12, "{k}: {promised}");
+        }
+        // Across the step nothing is known anew.
+        assert!((columns[0][0] * 0.7 + columns[1][0] * 0.3 - (1.0 * 0.7 + 0.5 * 0.3)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn derivatives_from_elsewhere_find_the_way() {
+        let residuals = |p: &[f64]| Some(vec![p[0] - 1.0, p[0] + p[1] * p[1] - 5.0, p[1] - 2.0]);
+        // Those of y are of y = 0.5, where they are a quarter of what they are at the end.
+        let known = [vec![0.0, 1.0, 1.0]];
+        let found = fit(&residuals, &[free(0.0, -9.0, 9.0), free(0.5, -9.0, 9.0)], &known, EFFORT);
+        assert!((found.parameters[0] - 1.0).abs() < 1e-2 && (found.parameters[1] - 2.0).abs() < 1e-2, "{found:?}");
+    }
+
+    #[test]
     fn bounds_hold_and_the_rest_is_still_optimal() {
         // Minimum of (x - 3)² + (x + y)² with x <= 1 is x = 1, y = -1.
         let residuals = |p: &[f64]| Some(vec![p[0] - 3.0, p[0] + p[1]]);

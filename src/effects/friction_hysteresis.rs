@@ -39,7 +39,7 @@ crate::variables::variables! {
         /// Growth of the half width with the pull, as of a cord around a bolt
         half_width_per_pull: f64 = 0.0, ONE, (0.0..=0.5);
         /// Relative growth of the half width with contraction, at 0.1 m: the threads cross at another angle there
-        with_contraction: f64 = 0.0, ONE, (-1.0..=1.0);
+        with_contraction: f64 = 0.0, ONE, (-0.9..=0.9);
         /// Displacement after a reversal at which most of the loop is passed
         presliding_displacement: f64 = 2e-3, METRE, (1e-5..=0.1);
         /// Share of the second element in the loop
@@ -143,6 +143,7 @@ impl Effect for FrictionHysteresis {
         ],
     };
     const STATE_SCALES: &'static [f64] = &[1.0, 1.0];
+    const ENDS_INSIDE: &'static [&'static str] = &["friction_hysteresis.with_contraction"];
 
     fn is_neutral(&self) -> bool {
         self.half_width == 0.0 && self.half_width_per_pressure == 0.0 && self.half_width_per_pull == 0.0
