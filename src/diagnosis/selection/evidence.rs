@@ -21,15 +21,6 @@ pub fn evidence(without: &Fitted, with: &Fitted) -> f64 {
     odds(&without.losses, &with.losses, with.hypothesis.size() as f64 - without.hypothesis.size() as f64)
 }
 
-/// The same where no shape of a sound muscle is worth more than once in a block: for hypotheses that both leave no more than that.
-pub fn evidence_beside_structure(without: &Fitted, with: &Fitted) -> f64 {
-    let mut losses = with.losses.clone();
-    for loss in &mut losses {
-        loss.effective = loss.effective.min(loss.effective_beside_structure);
-    }
-    odds(&without.losses, &losses, with.hypothesis.size() as f64 - without.hypothesis.size() as f64)
-}
-
 /// The same of losses, for a hypothesis with so many parameters more.
 pub fn odds(without: &[Loss], with: &[Loss], more: f64) -> f64 {
     let samples: f64 = with.iter().map(|loss| loss.effective).sum();

@@ -177,7 +177,7 @@ impl Search<'_, '_> {
     fn rivals<'l>(&self, best: &Judged, size: usize, level: &'l [Judged]) -> Vec<&'l Judged> {
         let possible = level.iter().filter(|other| !same_effects(other, best) && is_possible(other));
         let (equal, behind): (Vec<_>, Vec<_>) =
-            possible.partition(|other| evidence_beside_structure(&other.fitted, &best.fitted) < RIVAL);
+            possible.partition(|other| evidence(&other.fitted, &best.fitted) < RIVAL);
         let by_form = || behind.into_iter().find(|other| self.differ_by_form(best, size, other));
         if equal.is_empty() { by_form().into_iter().collect() } else { equal }
     }
