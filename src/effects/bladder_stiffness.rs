@@ -60,13 +60,11 @@ impl Effect for BladderStiffness {
         ],
     };
 
+    const ENDS_INSIDE: &'static [&'static str] =
+        &["bladder_stiffness.added_growth", "bladder_stiffness.added_curvature"];
+
     fn is_neutral(&self) -> bool {
         [self.relative_change, self.change_with_contraction, self.added_force] == [0.0; 3]
-    }
-
-    fn is_plausible(&self) -> bool {
-        let grows_as_rubber = LEAST_GROWTH < self.added_growth && self.added_growth < MOST_GROWTH;
-        grows_as_rubber && self.added_curvature.abs() < MOST_CURVATURE
     }
 
     fn elastic_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {

@@ -35,11 +35,11 @@ crate::variables::variables! {
         /// Drift per contraction, first element
         amplitude_1: f64 = 0.0, ONE, (AHEAD..=1.0);
         /// Time constant, first element
-        time_1: f64 = 3.0, SECOND, (0.05..=300.0);
+        time_1: f64 = 3.0, SECOND, (0.05..=SLOWEST);
         /// Drift per contraction, second element
         amplitude_2: f64 = 0.0, ONE, (AHEAD..=1.0);
         /// Time constant, second element
-        time_2: f64 = 20.0, SECOND, (0.05..=300.0);
+        time_2: f64 = 20.0, SECOND, (0.05..=SLOWEST);
         /// Share of the contraction at the start that no drift belongs to
         relaxed_share: f64 = 1.0, ONE, (0.0..=1.0);
         /// Share of the remaining drift that lies before the start
@@ -65,6 +65,8 @@ crate::variables::variables! {
 
 /// Times in s from which on something gives way slowly; before, it is viscous.
 const SLOW: f64 = 0.2;
+/// Longest time constant in s; a stiffness that takes that long to relax is a spring that was put in at the start.
+const SLOWEST: f64 = 300.0;
 /// Argument beyond which flow grows no more, 6800 times as fast as a linear dashpot's: an integration can still follow it.
 const LARGEST_SINH: f64 = 12.0;
 /// Drift per contraction of a membrane that would push ahead of its load for good.
@@ -152,7 +154,8 @@ impl Effect for Creep {
 
     // The second element may be a small part of the whole, and fast.
     fn is_plausible(&self) -> bool {
-        self.time_1 > SLOW
+        let never_relaxes = self.relaxing_stiffness_1 != 0.0 && self.time_1 > 0.99 * SLOWEST;
+        self.time_1 > SLOW && !never_relaxes
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {

@@ -309,10 +309,14 @@ pub trait Effect: Declared + Default {
     }
 }
 
+/// How near to a bound a fit still ends at it, relative to the bound: it may stop on its way there.
+const NEARLY: f64 = 0.01;
+
 fn ends_inside<E: Effect>(effect: &E) -> bool {
     let mut inside = true;
     effect.visit(&mut |variable, value| {
-        inside &= !E::ENDS_INSIDE.contains(&variable.name) || (variable.min < value && value < variable.max);
+        let (lower, upper) = (variable.min + NEARLY * variable.min.abs(), variable.max - NEARLY * variable.max.abs());
+        inside &= !E::ENDS_INSIDE.contains(&variable.name) || (lower < value && value < upper);
     });
     inside
 }

@@ -94,14 +94,14 @@ impl Search<'_, '_> {
         }
     }
 
-    /// The hypothesis without refinements, where that leaves nothing either: they were for the comparison with its rivals.
+    /// The hypothesis without refinements, where that leaves nothing either and its causes can be so: they were for the comparison with its rivals.
     fn simplest(&self, judged: &Judged) -> Judged {
         if !judged.fitted.hypothesis.is_refined() {
             return judged.clone();
         }
         let plain = self.bench.less_refined(&judged.fitted, |_| false);
         let plain = plain.filter(|fitted| is_negligible(&fitted.losses)).map(|fitted| self.judge(fitted));
-        plain.unwrap_or_else(|| judged.clone())
+        plain.filter(is_possible).unwrap_or_else(|| judged.clone())
     }
 
     /// The hypothesis without those refinements that may as well be neutral: by their intervals, and by what is lost without them.
