@@ -6,8 +6,8 @@
 //! steps do. A prior counts as one more residual.
 //!
 //! # Reference
-//! D. Marquardt (1963), doi 10.1137/0111030; updates: C. Broyden (1965), doi 10.1090/S0025-5718-1965-0198670-6; bounds by active sets, as in J. Nocedal, S. Wright (2006), Numerical
-//! Optimization, algorithm 16.3. Own code because `levenberg-marquardt` 0.15 has no bounds.
+//! D. Marquardt (1963), doi 10.1137/0111030; updates: C. Broyden (1965), doi 10.1090/S0025-5718-1965-0198670-6; bounds by
+//! active sets, as in J. Nocedal, S. Wright (2006), Numerical Optimization, algorithm 16.3. Own code because `levenberg-marquardt` 0.15 has no bounds.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -110,18 +110,13 @@ where
             ended = Ended::Converged;
             break;
         };
-        let decrease = current.cost - better.cost;
-        update(
-            &mut columns,
-            &problem.step_between(&current.parameters, &better.parameters),
-            &current.residuals,
-            &better.residuals,
-        );
-        current = better;
-        if decrease <= least {
+        let before = std::mem::replace(&mut current, better);
+        if before.cost - current.cost <= least {
             ended = Ended::Converged;
             break;
         }
+        let step = problem.step_between(&before.parameters, &current.parameters);
+        update(&mut columns, &step, &before.residuals, &current.residuals);
     }
     Fit { parameters: current.parameters, residuals: current.residuals, cost: current.cost, ended }
 }

@@ -252,7 +252,7 @@ impl Hypothesis {
     }
 
     /// Whether an effect would have to be other than it can be, or larger: the fit ended at a bound of its size.
-    pub fn is_impossible(&self, parameters: &Parameters) -> bool {
+    fn is_impossible(&self, parameters: &Parameters) -> bool {
         let is_too_large = |part: &Part| {
             let (size, _) = *part.size();
             let ((variable, value), neutral) = (declared(parameters, size), declared(&Parameters::default(), size).1);
@@ -305,6 +305,13 @@ pub struct Fitted {
     pub residuals: Vec<f64>,
     /// How large they are, on all samples.
     pub losses: Vec<Loss>,
+}
+
+impl Fitted {
+    /// Whether its effects are such as they can be.
+    pub fn is_possible(&self) -> bool {
+        !self.hypothesis.is_impossible(&self.parameters)
+    }
 }
 
 /// Where a fit starts.
@@ -638,12 +645,16 @@ impl<'a> Bench<'a> {
 
     /// What the parameters of a hypothesis, corrections among them, do to the residuals of a model.
     fn slopes_at(&self, hypothesis: &Hypothesis, model: &Parameters) -> Option<Slopes> {
-        let here = self.residuals(model)?;
         let (of, free) = self.everything_free(hypothesis, model);
-        let at: Vec<f64> = free.iter().map(|free| free.start).collect();
-        let residuals = |values: &[f64]| self.residuals(&with_values(model, &of, values));
-        let by = derivatives(&residuals, &free, &at, &here);
+        let by = self.derivatives(model, &of, &free)?;
         Some(Slopes { of, by })
+    }
+
+    /// Change of the residuals of a model per unit of some of its parameters, which are free from where they are.
+    fn derivatives(&self, model: &Parameters, variables: &[&'static Variable], free: &[Free]) -> Option<Vec<Vec<f64>>> {
+        let at: Vec<f64> = free.iter().map(|free| free.start).collect();
+        let residuals = |values: &[f64]| self.residuals(&with_values(model, variables, values));
+        Some(derivatives(&residuals, free, &at, &self.residuals(model)?))
     }
 
     fn fitted(&self, hypothesis: &Hypothesis, parameters: Parameters, residuals: Vec<f64>) -> Fitted {
@@ -768,10 +779,9 @@ impl<'a> Bench<'a> {
     /// far it goes if the inputs are no straight lines between their samples.
     pub fn intervals(&self, fitted: &Fitted, scope: Scope) -> (Vec<FittedParameter>, Vec<FittedParameter>) {
         let (variables, free) = self.everything_free(&fitted.hypothesis, &fitted.parameters);
-        let at: Vec<f64> = free.iter().map(|f| f.start).collect();
-        let deviations = self.deviations(&variables, &free, &at, fitted, scope);
+        let deviations = self.deviations(&variables, &free, fitted, scope);
         let parameters = variables.iter().enumerate().map(|(k, variable)| {
-            let (value, half) = (at[k], 1.96 * deviations.as_ref().map_or(f64::INFINITY, |d| d[k]));
+            let (value, half) = (free[k].start, 1.96 * deviations.as_ref().map_or(f64::INFINITY, |d| d[k]));
             let (low, high) = ((value - half).max(free[k].lower), (value + half).min(free[k].upper));
             FittedParameter { name: variable.name, value, low, high, unit: variable.unit.symbol }
         });
@@ -785,16 +795,14 @@ impl<'a> Bench<'a> {
         &self,
         variables: &[&'static Variable],
         free: &[Free],
-        at: &[f64],
         fitted: &Fitted,
         scope: Scope,
     ) -> Option<Vec<f64>> {
-        let residuals = |values: &[f64]| self.residuals(&with_values(self.nominal, variables, values));
         let weights = self.data.weights(scope);
         let scaled = |(column, free): (Vec<f64>, &Free)| -> Vec<f64> {
             column.iter().zip(&weights).map(|(slope, weight)| slope * weight * free.typical).collect()
         };
-        let columns = derivatives(&residuals, free, at, &fitted.residuals);
+        let columns = self.derivatives(&fitted.parameters, variables, free)?;
         let columns: Vec<Vec<f64>> = columns.into_iter().zip(free).map(scaled).collect();
         // The small constant keeps a parameter without influence from spoiling the others.
         let priors = free.iter().map(|free| 1e-9 + free.prior.map_or(0.0, |(_, of)| (free.typical / of).powi(2)));
@@ -812,11 +820,9 @@ impl<'a> Bench<'a> {
     pub fn shows_elsewhere(&self, fitted: &Fitted, seen: Scope) -> bool {
         let variables = fitted.hypothesis.variables();
         let free = bounds(&variables, &fitted.parameters);
-        let at: Vec<f64> = free.iter().map(|f| f.start).collect();
-        let residuals = |values: &[f64]| self.residuals(&with_values(&fitted.parameters, &variables, values));
         let [seen, unseen] = [seen, seen.others()].map(|scope| self.data.weights(scope));
-        let columns = derivatives(&residuals, &free, &at, &fitted.residuals);
-        columns.iter().any(|column| cost(column, &seen) == 0.0 && cost(column, &unseen) > 0.0)
+        let is_late = |column: &Vec<f64>| cost(column, &seen) == 0.0 && cost(column, &unseen) > 0.0;
+        self.derivatives(&fitted.parameters, &variables, &free).is_some_and(|columns| columns.iter().any(is_late))
     }
 
     /// Sum over blocks of the squared gradients that each of them contributes, enlarged for how few they are.

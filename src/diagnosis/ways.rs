@@ -115,7 +115,8 @@ impl Found<'_> {
         each.into_iter().flatten().map(|fit| self.odds_against_fit(other, fit)).fold(f64::INFINITY, f64::min)
     }
 
-    /// The best fit with the causes that were found elsewhere, too, in the forms that they have there; `None` where none was.
+    /// The best fit with the causes that were found elsewhere, too, in the forms that they have there; `None` where none was, or where they
+    /// cannot be so.
     fn in_forms_of(&self, other: &Self) -> Option<Fitted> {
         let [own, others] = [&self.chosen.best, &other.chosen.best];
         let shared = others.hypothesis.parts.iter().copied().filter(|part| own.hypothesis.has(part.effect.name));
@@ -126,8 +127,7 @@ impl Found<'_> {
         let hypothesis = shared.parts.iter().fold(own.hypothesis.clone(), |all, part| all.in_form_of(*part));
         let without = shared.parts.iter().fold(own.parameters, |model, part| neutralised(&model, part.effect));
         let start = shared.at_work_in(&without, &others.parameters);
-        let fit = self.bench.exact_fit(&hypothesis, &start, Scope::All)?;
-        (!hypothesis.is_impossible(&fit.parameters)).then_some(fit)
+        self.bench.exact_fit(&hypothesis, &start, Scope::All).filter(Fitted::is_possible)
     }
 
     /// The odds against one fit of the other way; the likelihoods are those of the other one's data.

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Holds, Point};
+use super::{Description, Effect, Holds, NEARLY, Point};
 
 crate::variables::variables! {
     /// Creep: the membrane gives way slowly, or settles into the braid slowly.
@@ -154,7 +154,7 @@ impl Effect for Creep {
 
     // The second element may be a small part of the whole, and fast.
     fn is_plausible(&self) -> bool {
-        let never_relaxes = self.relaxing_stiffness_1 != 0.0 && self.time_1 > 0.99 * SLOWEST;
+        let never_relaxes = self.relaxing_stiffness_1 != 0.0 && self.time_1 > (1.0 - NEARLY) * SLOWEST;
         self.time_1 > SLOW && !never_relaxes
     }
 

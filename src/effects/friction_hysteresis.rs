@@ -10,12 +10,13 @@ crate::variables::variables! {
     /// Dry friction between threads and rubber: a loss that depends on the way, not on its speed.
     ///
     /// # Model
-    /// F ← F − (w₀ + w₁ p + μ |F|) (1 + b (x/0.1 m − 1)) h (1 + c exp(−(v/v_s)²)), with the loop h = (1 − m) z₁ + m z₂ of two elements that pass it
-    /// within the displacements s and r s: s dz/dx = 1 − (γ sgn(v z) + 1 − γ) |z|ⁿ. `half_width` w₀,
-    /// `half_width_per_pressure` w₁, `half_width_per_pull` μ, `with_contraction` b, `presliding_displacement` s, `second_share` m, `second_ratio` r, `knee` n,
-    /// `unloading` γ, `stribeck_share` c, `stribeck_velocity` v_s. n = γ = 1 is the law of Dahl. Both z stay within ±1. With a
-    /// `smoothing_velocity` v₀ it is Coulomb's law without a memory, h = tanh(v/v₀). A hanging load starts in balance with h at
-    /// `start`, by `second_start` and `third_start` more in these recordings.
+    /// F ← F − (w₀ + w₁ p + μ |F|) (1 + b (x/0.1 m − 1)) h (1 + c exp(−(v/v_s)²)), with the loop h = (1 − m) z₁ + m z₂ of two
+    /// elements that pass it within the displacements s and r s: s dz/dx = 1 − (γ sgn(v z) + 1 − γ) |z|ⁿ. `half_width` w₀,
+    /// `half_width_per_pressure` w₁, `half_width_per_pull` μ, `with_contraction` b, `presliding_displacement` s,
+    /// `second_share` m, `second_ratio` r, `knee` n, `unloading` γ, `stribeck_share` c, `stribeck_velocity` v_s. n = γ = 1 is
+    /// the law of Dahl. Both z stay within ±1. With a `smoothing_velocity` v₀ it is Coulomb's law without a memory,
+    /// h = tanh(v/v₀). A hanging load starts in balance with h at `start`, by `second_start` and `third_start` more in these
+    /// recordings.
     ///
     /// # In the data
     /// The force residual changes sign at every reversal; its width does not depend on speed. Triangles of shrinking

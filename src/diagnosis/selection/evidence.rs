@@ -75,6 +75,12 @@ pub fn is_unsound(losses: &[Loss], data: &Data) -> bool {
     !leaves_at_most(losses, |signal| left_by_structure(signal, data))
 }
 
+/// Whether no more is left of what there was before than forms may leave, which are never known exactly, or a sound model.
+pub fn may_be_form(before: &[Loss], left: &[Loss], data: &Data) -> bool {
+    let before = beyond_noise(before);
+    leaves_at_most(left, |signal| left_by_form(before[&signal]).max(left_by_structure(signal, data)))
+}
+
 /// Share of the error beyond noise that goes away.
 pub fn explained(without: &[Loss], with: &[Loss], data: &Data) -> f64 {
     let before: f64 = beyond_noise(without).values().sum();

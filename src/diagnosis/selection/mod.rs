@@ -87,10 +87,10 @@ impl Chosen {
 
     /// Whether the best fit to all samples leaves no more than a sound model may and, of several causes, their forms.
     pub fn says_all(&self, data: &Data) -> bool {
-        let before = beyond_noise(&self.without);
-        let has_several = self.best.hypothesis.causes() > 1;
-        let of_form = |signal| if has_several { left_by_form(before[&signal]) } else { 0.0 };
-        leaves_at_most(&self.best.losses, |signal| left_by_structure(signal, data).max(of_form(signal)))
+        match self.best.hypothesis.causes() {
+            0 | 1 => !is_unsound(&self.best.losses, data),
+            _ => may_be_form(&self.without, &self.best.losses, data),
+        }
     }
 
     /// Whether the causes take off so much that coefficients that are each off by themselves need not be what they stand for.
@@ -225,10 +225,9 @@ impl<'a, 'b> Search<'a, 'b> {
         now < self.most && is_worth && !self.is_sound(&self.baseline.losses) && !self.unlisted_says_all(levels)
     }
 
-    /// Whether residuals are small enough to be those of forms, which are never known exactly, or of a sound model.
+    /// Whether residuals are small enough to be those of forms or of a sound model.
     fn may_be_form(&self, losses: &[Loss]) -> bool {
-        let before = beyond_noise(&self.baseline.losses);
-        leaves_at_most(losses, |signal| left_by_form(before[&signal]).max(left_by_structure(signal, &self.bench.data)))
+        may_be_form(&self.baseline.losses, losses, &self.bench.data)
     }
 
     /// Share of what a hypothesis leaves that another one explains, in the signals in which it leaves more than forms may; where
@@ -411,7 +410,7 @@ fn same_effects(a: &Judged, b: &Judged) -> bool {
 
 /// Whether the effects of a hypothesis are such as they can be.
 fn is_possible(judged: &Judged) -> bool {
-    !judged.fitted.hypothesis.is_impossible(&judged.fitted.parameters)
+    judged.fitted.is_possible()
 }
 
 /// The best hypothesis that is possible.

@@ -140,15 +140,14 @@ impl Search<'_, '_> {
     /// do.
     fn foretelling(&self, told: Judged) -> Option<(Fitted, bool)> {
         let seeing = |seen| self.bench.exact_fit(&told.fitted.hypothesis, &told.fitted.parameters, seen);
-        let may_be = |fitted: &Fitted| !fitted.hypothesis.is_impossible(&fitted.parameters);
         let foretells = |fitted: &Fitted, seen| {
-            Some(may_be(fitted) && self.holds(fitted, seen)? && !self.bench.shows_elsewhere(fitted, seen))
+            Some(fitted.is_possible() && self.holds(fitted, seen)? && !self.bench.shows_elsewhere(fitted, seen))
         };
         let model = seeing(Scope::Training)?;
         if foretells(&model, Scope::Training)? {
             return Some((model, true));
         }
-        let tells_too_little = may_be(&model) && self.is_as_good_in_training(&told.fitted, &model)
+        let tells_too_little = model.is_possible() && self.is_as_good_in_training(&told.fitted, &model)
             || foretells(&seeing(Scope::HeldOut)?, Scope::HeldOut)?;
         (tells_too_little && self.holds(&told.fitted, Scope::Training)?).then_some((told.fitted, false))
     }
