@@ -75,13 +75,13 @@ pub struct FittedParameter {
     pub unit: &'static str,
 }
 
-/// Which refinements of an effect are free: a bit for each.
+/// Some of the parameters of a form, or of the refinements of an effect: a bit for each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Refined(u32);
+pub struct Which(u32);
 
-impl Refined {
+impl Which {
     /// None.
-    pub const NOT: Self = Self(0);
+    pub const NONE: Self = Self(0);
 
     /// The one at a position.
     pub const fn by(which: usize) -> Self {
@@ -99,6 +99,10 @@ impl Refined {
         (0..u32::BITS as usize).filter(move |which| self.has(*which)).map(Self::by)
     }
 
+    fn and(self, which: usize) -> Self {
+        Self(self.0 | Self::by(which).0)
+    }
+
     const fn has(self, which: usize) -> bool {
         self.0 & Self::by(which).0 != 0
     }
@@ -112,7 +116,9 @@ pub struct Part {
     /// Which of its forms.
     pub form: usize,
     /// Which of its refinements are free as well.
-    pub refined: Refined,
+    pub refined: Which,
+    /// Which parameters of its form stay at their defaults after all.
+    held: Which,
 }
 
 impl Part {
@@ -138,7 +144,16 @@ impl Part {
 
     /// The free parameters; a refinement that the form has already is not counted twice.
     pub fn freed(self) -> impl Iterator<Item = &'static Freed> {
-        self.in_form().iter().chain(self.refinements())
+        let of_form = self.in_form().iter().enumerate().filter(move |(which, _)| !self.held.has(*which));
+        of_form.map(|(_, freed)| freed).chain(self.refinements())
+    }
+
+    /// With some parameters at their defaults.
+    fn holding(self, names: &[&str]) -> Self {
+        let of_form = self.in_form().iter().enumerate();
+        let held = of_form.filter(|(_, (name, _))| names.contains(name)).map(|(which, _)| which);
+        let held = held.fold(self.held, Which::and);
+        Self { held, ..self.refined_as(|name| !names.contains(&name)) }
     }
 
     /// The refinements that are free, but for those that the form has already.
@@ -150,7 +165,7 @@ impl Part {
 
     /// With only those of its refinements whose parameters are wanted.
     fn refined_as(self, is_wanted: impl Fn(&str) -> bool) -> Self {
-        Self { refined: Refined::those(self.effect, |which, name| self.refined.has(which) && is_wanted(name)), ..self }
+        Self { refined: Which::those(self.effect, |which, name| self.refined.has(which) && is_wanted(name)), ..self }
     }
 
     /// A model with its refinements at their neutral defaults.
@@ -221,7 +236,7 @@ impl Hypothesis {
 
     /// Whether any refinement is free.
     pub fn is_refined(&self) -> bool {
-        self.parts.iter().any(|part| part.refined != Refined::NOT)
+        self.parts.iter().any(|part| part.refined != Which::NONE)
     }
 
     /// Names of the effects, sorted.
@@ -469,21 +484,21 @@ impl<'a> Bench<'a> {
     ///
     /// `None` where the start cannot be simulated.
     pub fn exact_fit(&self, hypothesis: &Hypothesis, start: &Parameters, scope: Scope) -> Option<Fitted> {
-        let mut best: Option<(Fitted, f64)> = None;
-        for _ in 0..MOST_ROUNDS {
-            let from = best.as_ref().map_or(*start, |(fitted, _)| fitted.parameters);
-            let slopes = self.slopes_at(&Hypothesis::default(), &from)?;
-            let fitted = self.fit(hypothesis, &from, scope, &slopes, EXACT)?;
-            let cost = cost(&fitted.residuals, &self.data.weights(scope));
-            let before = best.as_ref().map_or(f64::INFINITY, |(_, cost)| *cost);
-            if cost < before {
-                best = Some((fitted, cost));
+        let weights = self.data.weights(scope);
+        let mut best = self.fitted(hypothesis, *start, self.residuals(start)?);
+        for round in 0..MOST_ROUNDS {
+            let slopes = self.slopes_at(&Hypothesis::default(), &best.parameters)?;
+            let next = self.fit(hypothesis, &best.parameters, scope, &slopes, EXACT)?;
+            let [before, now] = [&best, &next].map(|fitted| cost(&fitted.residuals, &weights));
+            // The start need not be as likely as a fit.
+            if round == 0 || now < before {
+                best = next;
             }
-            if cost > (1.0 - SMALL_GAIN) * before {
+            if now > (1.0 - SMALL_GAIN) * before {
                 break;
             }
         }
-        best.map(|(fitted, _)| fitted)
+        Some(best)
     }
 
     /// A hypothesis with only those of its refinements whose parameters are wanted, fitted anew; `None` where it cannot be simulated.
@@ -492,6 +507,19 @@ impl<'a> Bench<'a> {
         let fewer = hypothesis.refined_as(is_wanted);
         let plain = hypothesis.parts.iter().fold(*parameters, |model, part| part.unrefined(&model));
         self.exact_fit(&fewer, &fewer.at_work_in(&plain, parameters), Scope::All)
+    }
+
+    /// A possible fit in the place of one that is impossible only by what ended at bounds of shapes: these at their defaults.
+    pub fn possible_instead(&self, fitted: &Fitted) -> Option<Fitted> {
+        let Fitted { hypothesis, parameters, .. } = fitted;
+        let at_ends = parameters.effects.at_ends();
+        if at_ends.is_empty() || hypothesis.parts.iter().any(|part| at_ends.contains(&part.size().0)) {
+            return None;
+        }
+        let parts = hypothesis.parts.iter().map(|part| part.holding(&at_ends)).collect();
+        let less = Hypothesis { parts, ..*hypothesis };
+        let plain = hypothesis.parts.iter().fold(*parameters, |model, part| neutralised(&model, part.effect));
+        self.exact_fit(&less, &less.at_work_in(&plain, parameters), Scope::All).filter(Fitted::is_possible)
     }
 
     /// A model at least as good, with sizes nearby of those effects whose error has many minima.
@@ -679,12 +707,12 @@ impl<'a> Bench<'a> {
     pub fn forms(&self, effect: &'static Description) -> impl Iterator<Item = Part> {
         let forms = effect.all_forms().enumerate();
         let possible = forms.filter(|(_, form)| form.iter().all(|(name, _)| self.means_something(name)));
-        possible.map(move |(form, _)| Part { effect, form, refined: Refined::NOT })
+        possible.map(move |(form, _)| Part { effect, form, refined: Which::NONE, held: Which::NONE })
     }
 
     /// All refinements of an effect that mean something here.
-    pub fn fully(&self, effect: &Description) -> Refined {
-        Refined::those(effect, |_, name| self.means_something(name))
+    pub fn fully(&self, effect: &Description) -> Which {
+        Which::those(effect, |_, name| self.means_something(name))
     }
 
     /// Whether there are as many recordings as a parameter is for.
@@ -892,6 +920,7 @@ fn weighted(residuals: &[f64], weights: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Effects;
 
     #[test]
     fn a_change_counts_in_the_blocks_that_it_makes_better() {
@@ -899,6 +928,20 @@ mod tests {
         // The second block would be worse by 0.16, though one of its residuals gets smaller; the third no better and no worse.
         forgive(&mut change, &[1.0, 1.0, 0.1, 1.0, 0.0, -1.0], (vec![0, 0, 1, 1, 2, 2], 3));
         assert_eq!(change, [-1.0, -1.5, 0.0, 0.0, 0.0, 2.0]);
+    }
+
+    #[test]
+    fn what_is_held_is_neither_free_in_a_form_nor_as_a_refinement() {
+        let effect = Effects::DESCRIPTIONS.iter().find(|effect| effect.name == "leakage").unwrap();
+        let form =
+            effect.all_forms().position(|form| form.iter().any(|(name, _)| *name == "leakage.choked_share")).unwrap();
+        let refined = Which::those(effect, |_, name| name == "leakage.exponent" || name == "leakage.volume_growth");
+        let part = Part { effect, form, refined, held: Which::NONE };
+        let names = |part: Part| part.freed().map(|(name, _)| *name).collect::<Vec<_>>();
+        assert_eq!(names(part), ["leakage.rate", "leakage.choked_share", "leakage.volume_growth", "leakage.exponent"]);
+        let held = part.holding(&["leakage.choked_share", "leakage.exponent", "creep.amplitude_1"]);
+        assert_eq!(names(held), ["leakage.rate", "leakage.volume_growth"]);
+        assert_eq!(held.size().0, "leakage.rate");
     }
 
     #[test]

@@ -312,13 +312,16 @@ pub trait Effect: Declared + Default {
 /// How near to a bound a fit still ends at it, relative to the bound: it may stop on its way there.
 const NEARLY: f64 = 0.01;
 
-fn ends_inside<E: Effect>(effect: &E) -> bool {
-    let mut inside = true;
+/// Names of the parameters at whose bounds a fit ended that must end inside.
+fn at_ends<E: Effect>(effect: &E) -> Vec<&'static str> {
+    let mut names = Vec::new();
     effect.visit(&mut |variable, value| {
         let (lower, upper) = (variable.min + NEARLY * variable.min.abs(), variable.max - NEARLY * variable.max.abs());
-        inside &= !E::ENDS_INSIDE.contains(&variable.name) || (lower < value && value < upper);
+        if E::ENDS_INSIDE.contains(&variable.name) && !(lower < value && value < upper) {
+            names.push(variable.name);
+        }
     });
-    inside
+    names
 }
 
 /// A hook of all effects that have states, one after the other; `states` are those of all effects.
@@ -367,7 +370,12 @@ macro_rules! effects {
 
             /// Whether the values of the effect with this name are such as its cause can have.
             pub fn is_plausible(&self, name: &str) -> bool {
-                true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible() && ends_inside(&self.$field)))*
+                true $(&& ($Effect::DESCRIPTION.name != name || self.$field.is_plausible() && at_ends(&self.$field).is_empty()))*
+            }
+
+            /// Names of the parameters at whose bounds a fit ended that must end inside.
+            pub fn at_ends(&self) -> Vec<&'static str> {
+                [$(at_ends(&self.$field),)*].concat()
             }
 
             /// Whether what the effect with this name does hangs on chance in part.
@@ -662,5 +670,6 @@ mod tests {
         assert!(creeps.is_plausible("creep"));
         creeps.creep.pull_amplitude = 1.0;
         assert!(!creeps.is_plausible("creep") && creeps.is_plausible("leakage"));
+        assert_eq!(creeps.at_ends(), ["creep.pull_amplitude"]);
     }
 }

@@ -1,14 +1,16 @@
 //! Hypotheses in their best form: refined, in other forms of their effects, fitted to the end.
 
-use super::evidence::{beyond_noise, is_unsound, leaves_at_most, left_by_form, left_by_structure};
+use super::evidence::{beyond_noise, evidence, is_unsound, leaves_at_most, left_by_form, left_by_structure};
 use super::naming::{LEAST_EXPLAINED, LEAST_EXPLAINED_EXACTLY};
-use super::{Judged, Search, carried_on, is_possible, possible, price_of_parameter, same_effects, sorted};
-use crate::diagnosis::candidates::{Fitted, Part, Refined, Slopes};
+use super::{
+    Judged, LEAST_EVIDENCE, Search, carried_on, is_possible, possible, price_of_parameter, same_effects, sorted,
+};
+use crate::diagnosis::candidates::{Fitted, Part, Slopes, Which};
 use crate::diagnosis::residuals::Scope;
 use rayon::prelude::*;
 
 /// Share of the error that a hypothesis must explain to be refined as a possible rival of the best.
-const MAY_RIVAL: f64 = 0.8;
+const MAY_RIVAL: f64 = 0.7;
 /// Hypotheses that may become rivals: of those that explain enough, so many by their odds and so many by what they explain.
 const MAY_BE_RIVALS: usize = 5;
 /// How many times what a rival may leave a fit must leave for its end not to be worth the time: of 395 ends of fits none took off more than
@@ -52,12 +54,23 @@ impl Search<'_, '_> {
             .map_or(judged.clone(), |fitted| self.judge(fitted))
     }
 
-    /// A hypothesis refined and fitted to the end, unless that brings it nowhere near the `best`; as it is where its refinements would end
-    /// where its causes cannot be.
+    /// A hypothesis refined and fitted to the end, unless that brings it nowhere near the `best`. Where its causes could not be as they are
+    /// then, without what the data do not ask for, or as it was.
     fn finished_refined(&self, judged: Judged, best: Option<&Judged>, refine: impl Fn(Judged) -> Judged) -> Judged {
         let finished = |judged| if self.is_out_of_reach(best, &judged) { judged } else { self.finished(judged) };
         let refined = finished(refine(judged.clone()));
-        if is_possible(&refined) || !is_possible(&judged) { refined } else { finished(judged) }
+        if is_possible(&refined) {
+            return refined;
+        }
+        let instead = if self.is_out_of_reach(best, &refined) { None } else { self.possible_instead(&refined) };
+        instead.unwrap_or_else(|| if is_possible(&judged) { finished(judged) } else { refined })
+    }
+
+    /// The hypothesis with the shapes at whose bounds its fit ended at their defaults, where that is possible and the odds do not ask for them: data
+    /// that do not tell a shape leave it anywhere.
+    fn possible_instead(&self, impossible: &Judged) -> Option<Judged> {
+        let instead = self.bench.possible_instead(&impossible.fitted)?;
+        (evidence(&instead, &impossible.fitted) < LEAST_EVIDENCE).then(|| self.judge(instead))
     }
 
     /// Whether a hypothesis explains so much less than a best one that says all that the end of its fit changes nothing.
@@ -84,7 +97,7 @@ impl Search<'_, '_> {
             .hypothesis
             .parts
             .iter()
-            .any(|part| ![Refined::NOT, self.bench.fully(part.effect)].contains(&part.refined));
+            .any(|part| ![Which::NONE, self.bench.fully(part.effect)].contains(&part.refined));
         let further = partly.then(|| self.finished_refined(refined.clone(), best, |judged| self.refined(judged)));
         let other =
             self.in_other_forms(&judged).map(|other| self.finished_refined(other, best, |other| self.refined(other)));
@@ -126,9 +139,9 @@ impl Search<'_, '_> {
             return judged;
         }
         let fully = self.bench.fully(part.effect);
-        let is_plain = part.refined == Refined::NOT;
+        let is_plain = part.refined == Which::NONE;
         let mut ways = if is_plain {
-            vec![fully, Refined::NOT]
+            vec![fully, Which::NONE]
         } else if part.refined == fully {
             return judged;
         } else {
@@ -137,7 +150,7 @@ impl Search<'_, '_> {
         ways.dedup(); // where there is none
         // What hangs on details hangs on what all else does here, too.
         let Some(slopes) = self.bench.slopes(&judged.fitted) else { return judged };
-        let refined_by = |ways: Vec<Refined>| -> Vec<Judged> {
+        let refined_by = |ways: Vec<Which>| -> Vec<Judged> {
             ways.into_par_iter().filter_map(|refined| self.refined_by(&judged, which, refined, &slopes)).collect()
         };
         let mut fits = refined_by(ways);
@@ -158,7 +171,7 @@ impl Search<'_, '_> {
         with - without > price_of_parameter(&plain.fitted)
     }
 
-    fn refined_by(&self, judged: &Judged, which: usize, refined: Refined, slopes: &Slopes) -> Option<Judged> {
+    fn refined_by(&self, judged: &Judged, which: usize, refined: Which, slopes: &Slopes) -> Option<Judged> {
         let mut hypothesis = judged.fitted.hypothesis.clone();
         let part = &mut hypothesis.parts[which];
         let known: Vec<&str> = part.freed().map(|(name, _)| *name).collect();

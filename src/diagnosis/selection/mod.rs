@@ -144,6 +144,11 @@ impl<'a, 'b> Search<'a, 'b> {
         while self.is_worth_going_on(&levels) {
             let next = self.next_level(levels.last()?, from);
             levels.push(next);
+            // What is not told has no rivals.
+            if self.leading(&levels).is_some_and(|best| best.fitted.hypothesis.parts.len() == levels.len()) {
+                let next = levels.pop()?;
+                levels.push(self.rivals_in_best_form(next));
+            }
         }
         self.choose(&levels, singles)
     }
@@ -272,7 +277,7 @@ impl<'a, 'b> Search<'a, 'b> {
             next = each_once(next);
             exchanged_in.push(names);
         }
-        self.rivals_in_best_form(next)
+        next
     }
 
     /// Hypotheses with effects of the best exchanged for others, those that are `known` to be as good in another form left out.
