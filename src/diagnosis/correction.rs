@@ -9,7 +9,7 @@
 //! # Reference
 //! Discrepancy of a model as a smooth function: M. Kennedy, A. O'Hagan (2001), doi 10.1111/1467-9868.00294.
 
-use super::candidates::Bench;
+use super::fits::Bench;
 use super::residuals::Scope;
 use crate::correction::{ActsOn, COEFFICIENTS, Quantity, UnknownCause};
 use crate::least_squares::{Free, derivatives, normal_matrix};

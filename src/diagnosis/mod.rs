@@ -1,4 +1,4 @@
-//! What a simulation gets wrong, and why: residuals → candidates → selection → report.
+//! What a simulation gets wrong, and why: residuals → hypotheses → fits → selection → report.
 //!
 //! # Method
 //! The nominal model is first allowed to be a little off (areas, elastic force and damping within the declared tolerance).
@@ -6,8 +6,9 @@
 //! freed. An effect is named when it explains a good part of the error beyond doubt; otherwise the answer is that
 //! nothing is wrong, or that the cause is unknown; so it is where a cause that is in no library explains far more (`unlisted`).
 
-mod candidates;
 mod correction;
+mod fits;
+mod hypothesis;
 mod links;
 mod noise;
 pub mod plan;
@@ -18,8 +19,8 @@ mod selection;
 mod unlisted;
 mod ways;
 
-pub use candidates::FittedParameter;
 pub use correction::Correction;
+pub use fits::FittedParameter;
 pub use remaining::Remaining;
 
 use crate::measurement::{Recording, Signal};
@@ -28,7 +29,8 @@ use crate::quality;
 use crate::simulation::replay;
 use crate::variables::Declared;
 use crate::{Error, Result};
-use candidates::{Bench, Fitted, Off, Part, recordings_for};
+use fits::{Bench, Fitted};
+use hypothesis::{Off, Part, recordings_for};
 use residuals::Data;
 use residuals::Scope;
 use selection::{Chosen, Judged, MOST_EFFECTS};

@@ -1,7 +1,8 @@
 //! How the coefficients of a nominal muscle are off decides what is an effect: off as a whole, most muscles show small ones; coefficients
 //! that are each off by themselves can stand for many. Bayes' rule weighs both.
 
-use super::candidates::{Bench, Fitted, Hypothesis, neutralised};
+use super::fits::{Bench, Fitted};
+use super::hypothesis::{Hypothesis, neutralised};
 use super::residuals::Scope;
 use super::selection::evidence::{is_unsound, odds};
 use super::selection::{Chosen, LEAST_EVIDENCE, MOST_EFFECTS, Search};

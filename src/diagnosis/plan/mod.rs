@@ -15,7 +15,7 @@ pub use excitations::EXCITATIONS;
 pub use files::{files, matrix, to_json};
 pub use rivals::{Rival, Task};
 
-use super::candidates::{Off, corrections};
+use super::hypothesis::{Off, corrections};
 use crate::measurement::Signal;
 use crate::parameters::Parameters;
 use crate::{Error, Result};

@@ -13,7 +13,7 @@ use super::excitations::{EXCITATIONS, Excitation, PROGRAMME};
 use super::rivals::Rival;
 use super::{Limits, Place};
 use crate::GRAVITY;
-use crate::diagnosis::candidates::{bounds, declared, with_values};
+use crate::diagnosis::hypothesis::{bounds, declared, with_values};
 use crate::least_squares::{self, Effort, Ended, Free};
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;

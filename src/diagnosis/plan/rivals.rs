@@ -1,6 +1,6 @@
 //! What an experiment is to tell apart: models that a diagnosis left standing, or effects at a usual size.
 
-use crate::diagnosis::candidates::{declared, with_values};
+use crate::diagnosis::hypothesis::{declared, with_values};
 use crate::effects::{Description, Effects};
 use crate::measurement::Signal;
 use crate::parameters::Parameters;

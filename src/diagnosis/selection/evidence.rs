@@ -1,6 +1,6 @@
 //! What speaks for a hypothesis: what it takes off the error, and what may be left of it.
 
-use crate::diagnosis::candidates::Fitted;
+use crate::diagnosis::fits::Fitted;
 use crate::diagnosis::residuals::{Data, Loss};
 use crate::measurement::Signal;
 use std::collections::BTreeMap;

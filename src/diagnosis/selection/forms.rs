@@ -5,7 +5,8 @@ use super::naming::{LEAST_EXPLAINED, LEAST_EXPLAINED_EXACTLY};
 use super::{
     Judged, LEAST_EVIDENCE, Search, carried_on, is_possible, possible, price_of_parameter, same_effects, sorted,
 };
-use crate::diagnosis::candidates::{Fitted, Part, Slopes, Which};
+use crate::diagnosis::fits::{Fitted, Slopes};
+use crate::diagnosis::hypothesis::{Part, Which};
 use crate::diagnosis::residuals::Scope;
 use rayon::prelude::*;
 

@@ -6,7 +6,8 @@ mod makeshift;
 mod naming;
 
 use super::Verdict;
-use super::candidates::{Bench, Fitted, Part, Slopes, Start, has_many_minima, neutralised};
+use super::fits::{Bench, Fitted, Slopes, Start};
+use super::hypothesis::{Part, has_many_minima, neutralised};
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;

@@ -3,7 +3,8 @@
 
 use super::evidence::*;
 use super::{Chosen, Judged, LEAST_EVIDENCE, Search, effects_of, is_possible, same_effects};
-use crate::diagnosis::candidates::{Fitted, declared};
+use crate::diagnosis::fits::Fitted;
+use crate::diagnosis::hypothesis::declared;
 use crate::diagnosis::residuals::Scope;
 use crate::diagnosis::{FittedParameter, Verdict};
 use crate::effects::Holds;
