@@ -175,7 +175,7 @@ pub fn diagnose(
     };
     let Found { bench, chosen } = match Off::ways(nominal) {
         [narrow, wide] => ways::better(prepared(narrow)?, || prepared(wide), done)?,
-        ways => prepared(&ways[0])?.searched(MOST_EFFECTS, None, done),
+        ways => prepared(&ways[0])?.searched(MOST_EFFECTS, done),
     }
     .ok_or_else(cannot_follow)?;
     answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)

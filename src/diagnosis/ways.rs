@@ -31,14 +31,10 @@ impl<'a> Way<'a> {
         !is_unsound(&self.baseline.losses, &self.bench.data)
     }
 
-    /// Looks for at most so many effects, be it beside what another way found; `done` is told after the nominal model and each candidate. `None`
-    /// where a model cannot be simulated.
-    pub fn searched(mut self, most: usize, other: Option<&Found>, done: &(dyn Fn(&str) + Sync)) -> Option<Found<'a>> {
+    /// Looks for at most so many effects; `done` is told after the nominal model and each candidate. `None` where a model cannot be simulated.
+    pub fn searched(mut self, most: usize, done: &(dyn Fn(&str) + Sync)) -> Option<Found<'a>> {
         done("nominal");
-        // Where more than one is looked for, single effects are what others are added to.
-        let saying_all = other.filter(|other| most == 1 && other.chosen.says_all(&other.bench.data));
-        let known = saying_all.map(|other| &other.chosen.singles[..]);
-        let chosen = Search::new(&mut self.bench, self.baseline, most, self.allows_most).beside(known).run(done)?;
+        let chosen = Search::new(&mut self.bench, self.baseline, most, self.allows_most).run(done)?;
         Some(Found { bench: self.bench, chosen })
     }
 }
@@ -56,12 +52,12 @@ pub fn better<'a>(
     let at_once = if narrow.says_all() { None } else { Some(wide()?) };
     // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
     let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
-    let Some(found) = narrow.searched(most, None, done) else { return Ok(None) };
+    let Some(found) = narrow.searched(most, done) else { return Ok(None) };
     if found.finds_nothing() {
         return Ok(Some(found));
     }
     let wide = at_once.map_or_else(wide, Ok)?;
-    let next = wide.searched(found.most_beside(), Some(&found), done);
+    let next = wide.searched(found.most_beside(), done);
     Ok(next.map(|next| if found.beats(&next) { found } else { next }))
 }
 

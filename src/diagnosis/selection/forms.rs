@@ -7,7 +7,7 @@ use super::{
 };
 use crate::diagnosis::fits::{Fitted, Slopes};
 use crate::diagnosis::hypothesis::{Part, Which};
-use crate::diagnosis::residuals::{Loss, Scope};
+use crate::diagnosis::residuals::Scope;
 use rayon::prelude::*;
 
 /// Share of the error that a hypothesis must explain to be refined as a possible rival of the best.
@@ -78,17 +78,12 @@ impl Search<'_, '_> {
     fn is_out_of_reach(&self, best: Option<&Judged>, other: &Judged) -> bool {
         let says_all = |best: &&Judged| is_possible(best) && !is_unsound(&best.fitted.losses, &self.bench.data);
         best.filter(says_all).is_some_and(|best| {
+            let before = beyond_noise(&self.baseline.losses);
             let may_be_simpler = other.fitted.hypothesis.size() < best.fitted.hypothesis.size();
-            self.leaves_too_much(&other.fitted.losses, may_be_simpler)
-        })
-    }
-
-    /// Whether so much is left that the end of a fit leaves more than a sound model, or, if that counts, than the form of a cause.
-    pub(super) fn leaves_too_much(&self, losses: &[Loss], may_be_form: bool) -> bool {
-        let before = beyond_noise(&self.baseline.losses);
-        !leaves_at_most(losses, |signal| {
-            let of_form = if may_be_form { left_by_form(before[&signal]) } else { 0.0 };
-            OUT_OF_REACH * left_by_structure(signal, &self.bench.data).max(of_form)
+            !leaves_at_most(&other.fitted.losses, |signal| {
+                let of_form = if may_be_simpler { left_by_form(before[&signal]) } else { 0.0 };
+                OUT_OF_REACH * left_by_structure(signal, &self.bench.data).max(of_form)
+            })
         })
     }
 

@@ -44,8 +44,6 @@ const AS_PROMISING: f64 = 0.98;
 /// Starts from which a candidate is fitted, and the share of the first one's promise that a further one must have.
 const STARTS: usize = 2;
 const ALSO_PROMISING: f64 = 0.5;
-/// Share of the error that a single effect must explain to be fitted in the form that it has where coefficients may be off in another way.
-const MAY_COME_NEAR: f64 = 0.5;
 /// Share of the squares in which starts of a form differ that are not the same one scaled.
 const SAME_PROMISE: f64 = 1e-4;
 
@@ -110,8 +108,6 @@ pub struct Search<'a, 'b> {
     most: usize,
     /// Whether what the form of one cause may leave is worth a second one.
     minds_form: bool,
-    /// Single effects where the coefficients may be off in another way, if what was found there says all.
-    known: Option<&'b [Judged]>,
     /// The best cause that is in no library.
     unlisted: Option<Judged>,
 }
@@ -120,12 +116,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// A search from a baseline for at most so many effects. Where another search lets the coefficients be off in a way that allows more, what
     /// the form of a cause may leave is that one's to explain: else coefficients that are off come out as a second cause.
     pub fn new(bench: &'b mut Bench<'a>, baseline: Fitted, most: usize, minds_form: bool) -> Self {
-        Self { bench, baseline, most, minds_form, known: None, unlisted: None }
-    }
-
-    /// The same beside single effects that are `known` where the coefficients may be off in another way, and something says all there.
-    pub fn beside(self, known: Option<&'b [Judged]>) -> Self {
-        Self { known, ..self }
+        Self { bench, baseline, most, minds_form, unlisted: None }
     }
 
     fn judge(&self, fitted: Fitted) -> Judged {
@@ -144,29 +135,9 @@ impl<'a, 'b> Search<'a, 'b> {
         if singles.first().is_some_and(|best| best.evidence > LEAST_EVIDENCE) {
             singles = self.judged_anew(singles);
         }
-        let singles = match self.known {
-            Some(known) => self.beside_known(singles, known),
-            None if self.may_show() => self.refined_best(singles),
-            None => singles,
-        };
+        let singles = if self.may_show() { self.refined_best(singles) } else { singles };
         self.unlisted = if self.is_sound(&self.baseline.losses) { None } else { self.best_unlisted() };
         self.go_on(vec![singles.clone()], singles, &from)
-    }
-
-    /// Single effects, be it in the forms in which they are known; refined only where one comes near to leaving nothing, since else none can
-    /// stand for what says all elsewhere.
-    fn beside_known(&self, singles: Vec<Judged>, known: &[Judged]) -> Vec<Judged> {
-        let again = known.par_iter().filter(|single| single.explained > MAY_COME_NEAR).filter_map(|single| {
-            let Fitted { hypothesis, parameters, .. } = &single.fitted;
-            let start = hypothesis.at_work_in(&self.baseline.parameters, parameters);
-            Some(self.judge(self.bench.rough_fit(hypothesis, &start)?))
-        });
-        let again: Vec<Judged> = again.collect();
-        let singles = each_once(singles.into_iter().chain(again).collect());
-        // What is refined has its form.
-        let comes_near =
-            |single: &Judged| !self.leaves_too_much(&single.fitted.losses, !single.fitted.hypothesis.is_refined());
-        if singles.iter().any(comes_near) { self.refined_best(singles) } else { singles }
     }
 
     /// Adds levels of one effect more each while that is worth it, and chooses.
