@@ -175,28 +175,28 @@ impl<'a> Bench<'a> {
     /// `None` where the start cannot be simulated.
     pub fn exact_fit(&self, hypothesis: &Hypothesis, start: &Parameters, scope: Scope) -> Option<Fitted> {
         let weights = self.data.weights(scope);
-        let mut best = self.fitted(hypothesis, *start, self.residuals(start)?);
-        for round in 0..MOST_ROUNDS {
-            let slopes = self.slopes_at(&Hypothesis::default(), &best.parameters)?;
-            let next = self.fit(hypothesis, &best.parameters, scope, &slopes, EXACT)?;
-            let [before, now] = [&best, &next].map(|fitted| cost(&fitted.residuals, &weights));
+        let mut best: Option<Fitted> = None;
+        let mut before = cost(&self.residuals(start)?, &weights);
+        for _ in 0..MOST_ROUNDS {
+            let from = best.as_ref().map_or(*start, |fitted| fitted.parameters);
+            let slopes = self.slopes_at(&Hypothesis::default(), &from)?;
+            let next = self.fit(hypothesis, &from, scope, &slopes, EXACT)?;
+            let now = cost(&next.residuals, &weights);
+            let is_last = now > (1.0 - SMALL_GAIN) * before;
             // The start need not be as likely as a fit.
-            if round == 0 || now < before {
-                best = next;
+            if best.is_none() || now < before {
+                (best, before) = (Some(next), now);
             }
-            if now > (1.0 - SMALL_GAIN) * before {
+            if is_last {
                 break;
             }
         }
-        Some(best)
+        best
     }
 
     /// A hypothesis with only those of its refinements whose parameters are wanted, fitted anew; `None` where it cannot be simulated.
     pub fn less_refined(&self, fitted: &Fitted, is_wanted: impl Fn(&str) -> bool) -> Option<Fitted> {
-        let Fitted { hypothesis, parameters, .. } = fitted;
-        let fewer = hypothesis.refined_as(is_wanted);
-        let plain = hypothesis.parts.iter().fold(*parameters, |model, part| part.unrefined(&model));
-        self.exact_fit(&fewer, &fewer.at_work_in(&plain, parameters), Scope::All)
+        self.with_fewer_free(fitted, &fitted.hypothesis.refined_as(is_wanted))
     }
 
     /// A possible fit in the place of one that is impossible only by what ended at bounds of shapes: these at their defaults.
@@ -207,9 +207,14 @@ impl<'a> Bench<'a> {
             return None;
         }
         let parts = hypothesis.parts.iter().map(|part| part.holding(&at_ends)).collect();
-        let less = Hypothesis { parts, ..*hypothesis };
-        let plain = hypothesis.parts.iter().fold(*parameters, |model, part| neutralised(&model, part.effect));
-        self.exact_fit(&less, &less.at_work_in(&plain, parameters), Scope::All).filter(Fitted::is_possible)
+        self.with_fewer_free(fitted, &Hypothesis { parts, ..*hypothesis }).filter(Fitted::is_possible)
+    }
+
+    /// A hypothesis with the same effects of which fewer parameters are free, the others at their defaults; fitted anew.
+    fn with_fewer_free(&self, fitted: &Fitted, fewer: &Hypothesis) -> Option<Fitted> {
+        let Fitted { hypothesis, parameters, .. } = fitted;
+        let neutral = hypothesis.at_work_in(parameters, &Parameters::default());
+        self.exact_fit(fewer, &fewer.at_work_in(&neutral, parameters), Scope::All)
     }
 
     /// A model at least as good, with sizes nearby of those effects whose error has many minima.
@@ -402,7 +407,7 @@ impl<'a> Bench<'a> {
 
     /// All refinements of an effect that mean something here.
     pub fn fully(&self, effect: &Description) -> Which {
-        Which::those(effect, |_, name| self.means_something(name))
+        Which::those(effect.refinements, |_, name| self.means_something(name))
     }
 
     /// Whether there are as many recordings as a parameter is for.

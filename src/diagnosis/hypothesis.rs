@@ -49,19 +49,15 @@ impl Which {
         Self(1 << which)
     }
 
-    /// Those of an effect whose position and parameter are wanted.
-    pub fn those(effect: &Description, is_wanted: impl Fn(usize, &str) -> bool) -> Self {
-        let every = effect.refinements.iter().enumerate();
+    /// Those whose position and parameter are wanted.
+    pub fn those(freed: &[Freed], is_wanted: impl Fn(usize, &str) -> bool) -> Self {
+        let every = freed.iter().enumerate();
         Self(every.filter(|(which, (name, _))| is_wanted(*which, name)).map(|(which, _)| Self::by(which).0).sum())
     }
 
     /// Each of these alone.
     pub fn each(self) -> impl Iterator<Item = Self> {
         (0..u32::BITS as usize).filter(move |which| self.has(*which)).map(Self::by)
-    }
-
-    fn and(self, which: usize) -> Self {
-        Self(self.0 | Self::by(which).0)
     }
 
     const fn has(self, which: usize) -> bool {
@@ -116,9 +112,7 @@ impl Part {
 
     /// With some parameters at their defaults.
     pub fn holding(self, names: &[&str]) -> Self {
-        let of_form = self.in_form().iter().enumerate();
-        let held = of_form.filter(|(_, (name, _))| names.contains(name)).map(|(which, _)| which);
-        let held = held.fold(self.held, Which::and);
+        let held = Which::those(self.in_form(), |which, name| self.held.has(which) || names.contains(&name));
         Self { held, ..self.refined_as(|name| !names.contains(&name)) }
     }
 
@@ -131,15 +125,10 @@ impl Part {
 
     /// With only those of its refinements whose parameters are wanted.
     pub fn refined_as(self, is_wanted: impl Fn(&str) -> bool) -> Self {
-        Self { refined: Which::those(self.effect, |which, name| self.refined.has(which) && is_wanted(name)), ..self }
-    }
-
-    /// A model with its refinements at their neutral defaults.
-    pub fn unrefined(self, model: &Parameters) -> Parameters {
-        let default = Parameters::default();
-        let (variables, neutral): (Vec<_>, Vec<_>) =
-            self.refinements().map(|(name, _)| declared(&default, name)).unzip();
-        with_values(model, &variables, &neutral)
+        Self {
+            refined: Which::those(self.effect.refinements, |which, name| self.refined.has(which) && is_wanted(name)),
+            ..self
+        }
     }
 
     /// How many starts its form has.
@@ -360,7 +349,8 @@ mod tests {
         let effect = Effects::DESCRIPTIONS.iter().find(|effect| effect.name == "leakage").unwrap();
         let form =
             effect.all_forms().position(|form| form.iter().any(|(name, _)| *name == "leakage.choked_share")).unwrap();
-        let refined = Which::those(effect, |_, name| name == "leakage.exponent" || name == "leakage.volume_growth");
+        let refined =
+            Which::those(effect.refinements, |_, name| name == "leakage.exponent" || name == "leakage.volume_growth");
         let part = Part { refined, ..Part::plain(effect, form) };
         let names = |part: Part| part.freed().map(|(name, _)| *name).collect::<Vec<_>>();
         assert_eq!(names(part), ["leakage.rate", "leakage.choked_share", "leakage.volume_growth", "leakage.exponent"]);
