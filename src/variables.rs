@@ -32,6 +32,7 @@ pub mod units {
         ONE = "1", "Ratio", 1.0, [0, 0, 0, 0, 0];
         METRE = "m", "Length", 0.1, [0, 1, 0, 0, 0];
         SQUARE_METRE = "m2", "Area", 1e-3, [0, 2, 0, 0, 0];
+        SECOND_PER_METRE = "s/m", "InverseVelocity", 10.0, [0, -1, 1, 0, 0];
         PER_METRE = "1/m", "Curvature", 1.0, [0, -1, 0, 0, 0];
         SECOND = "s", "Time", 1.0, [0, 0, 1, 0, 0];
         KILOGRAM = "kg", "Mass", 10.0, [1, 0, 0, 0, 0];

@@ -12,8 +12,8 @@ crate::variables::variables! {
     /// Choudhury. Overlap: the spool opens no port while the
     /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
     /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
-    /// opens the more abruptly. The port for emptying may have another overlap, h (1 + a): `emptying_excess` a. All three may be
-    /// there, in this order.
+    /// opens the more abruptly. Rounded edges let |e| − h set in gradually, about a share of h around it: `overlap_rounding`. The port for
+    /// emptying may have another overlap, h (1 + a): `emptying_excess` a. All three may be there, in this order.
     ///
     /// # In the data
     /// The pressure residual in slow stairs with the muscle locked: a constant that changes sign with the direction
@@ -41,6 +41,8 @@ crate::variables::variables! {
         pressure_overlap: f64 = 0.0, PASCAL, (0.0..=2e5);
         /// How abruptly a port opens beyond the overlap
         overlap_steepness: f64 = 1.0, ONE, (1.0..=30.0);
+        /// Share of the overlap within which the edges of a port are rounded
+        overlap_rounding: f64 = 0.0, ONE, (0.0..=3.0);
         /// By which share the overlap of the port for emptying is wider
         emptying_excess: f64 = 0.0, ONE, (-0.95..=10.0);
         /// Where in its play the pilot starts, or in its overlap the pressure: -1 lower end, 1 upper end
@@ -63,6 +65,13 @@ impl ValveDeadBand {
     /// Deviation in Pa above the target below which the port for emptying does not open.
     fn overlap_of_emptying(&self) -> f64 {
         self.pressure_overlap * (1.0 + self.emptying_excess)
+    }
+
+    /// By how much in Pa an error is beyond an overlap: a hyperbola between 0 and error − overlap.
+    fn opening(&self, error: f64, overlap: f64) -> f64 {
+        let rounding = self.overlap_rounding * overlap;
+        let rounded = |beyond: f64| 0.5 * (beyond + beyond.hypot(rounding));
+        rounded(error - overlap) - rounded(-overlap)
     }
 
     /// Whether a pilot that has broken loose goes on until the command turns.
@@ -101,7 +110,11 @@ impl Effect for ValveDeadBand {
             ("valve_dead_band.play", &[0.01, 0.01, 0.01, 0.03, 0.03, 0.03, 0.08, 0.08, 0.08]),
             ("valve_dead_band.sliding_speed", &[1e-3]),
         ]],
-        refinements: &[("valve_dead_band.start", &[0.3]), ("valve_dead_band.jump_time", &[2.5e-4, 5e-4, 1e-3, 2.5e-3])],
+        refinements: &[
+            ("valve_dead_band.start", &[0.3]),
+            ("valve_dead_band.jump_time", &[2.5e-4, 5e-4, 1e-3, 2.5e-3]),
+            ("valve_dead_band.overlap_rounding", &[0.5]),
+        ],
     };
 
     fn is_neutral(&self) -> bool {
@@ -133,7 +146,7 @@ impl Effect for ValveDeadBand {
         }
         let error = target - at.gauge_pressure;
         let overlap = if error < 0.0 { self.overlap_of_emptying() } else { self.pressure_overlap };
-        let beyond = self.overlap_steepness * (error.abs() - overlap).max(0.0);
+        let beyond = self.overlap_steepness * self.opening(error.abs(), overlap);
         at.gauge_pressure + error.signum() * beyond.min(error.abs())
     }
 

@@ -9,8 +9,9 @@ crate::variables::variables! {
     /// Viscous damping beyond the nominal one, different for shortening and lengthening.
     ///
     /// # Model
-    /// F ← F − B v |v/v₀|ᵃ (1 + b (p/2 bar − 1) + c (x/0.1 m − 1)), with B = `contraction` for v > 0 and `extension` for
-    /// v < 0, stated at v₀ = 0.05 m/s, 2 bar and 0.1 m; `exponent` a, `with_pressure` b, `with_contraction` c.
+    /// F ← F − B asinh(k v)/k |v/v₀|ᵃ (1 + b (p/2 bar − 1) + c (x/0.1 m − 1)), with B = `contraction` for v > 0 and
+    /// `extension` for v < 0, stated at v₀ = 0.05 m/s, 2 bar and 0.1 m; `thinning` k, for none B v; `exponent` a,
+    /// `with_pressure` b, `with_contraction` c.
     ///
     /// # In the data
     /// A loop of the force residual that grows with speed; the same triangle at three speeds separates it from dry
@@ -23,7 +24,7 @@ crate::variables::variables! {
     ///
     /// # Reference
     /// D. Reynolds et al. (2003), Modeling the dynamic characteristics of pneumatic muscle, doi 10.1114/1.1554921
-    /// (damping of inflation and deflation); thesis eq. 3.47.
+    /// (damping of inflation and deflation); thesis eq. 3.47. Thinning: H. Eyring (1936), doi 10.1063/1.1749836.
     pub struct ViscousDamping in "viscous_damping." as Tunable {
         /// Additional damping while the muscle shortens
         contraction: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-80.0..=1e4);
@@ -31,6 +32,8 @@ crate::variables::variables! {
         extension: f64 = 0.0, NEWTON_SECOND_PER_METRE, (-80.0..=1e4);
         /// Growth of the additional damping with speed: 0 none, 1 in proportion
         exponent: f64 = 0.0, ONE, (-0.6..=2.0);
+        /// Inverse of the velocity beyond which the loss grows with its logarithm only
+        thinning: f64 = 0.0, SECOND_PER_METRE, (0.0..=100.0);
         /// Relative growth of the additional damping with pressure, at 2 bar
         with_pressure: f64 = 0.0, ONE, (-1.0..=1.0);
         /// Relative growth of the additional damping with contraction, at 0.1 m
@@ -42,7 +45,7 @@ impl Effect for ViscousDamping {
     const DESCRIPTION: Description = Description {
         name: "viscous_damping",
         meaning: "a loss that grows with velocity, unlike in shortening and lengthening",
-        equation: "F <- F - B v |v/v0|^a (1 + b (p/p0 - 1) + c (x/x0 - 1)),  B = B_contraction (v > 0) or B_extension (v < 0)",
+        equation: "F <- F - B asinh(k v)/k |v/v0|^a (1 + b (p/p0 - 1) + c (x/x0 - 1)),  B = B_contraction (v > 0) or B_extension (v < 0)",
         signature: "loop of the force residual grows with speed",
         experiment: "the same triangle at three speeds",
         reference: "Reynolds et al. 2003; thesis eq. 3.47",
@@ -52,6 +55,7 @@ impl Effect for ViscousDamping {
         further_forms: &[],
         refinements: &[
             ("viscous_damping.exponent", &[0.2, -0.2]),
+            ("viscous_damping.thinning", &[10.0]),
             ("viscous_damping.with_pressure", &[0.3]),
             ("viscous_damping.with_contraction", &[0.3]),
         ],
@@ -70,11 +74,12 @@ impl Effect for ViscousDamping {
             0.0 => 1.0,
             exponent => (v.hypot(SMALL_VELOCITY) / REFERENCE_VELOCITY).powf(exponent),
         };
+        let rate = if self.thinning == 0.0 { v } else { (self.thinning * v).asinh() / self.thinning };
         let place = 1.0
             + self.with_pressure * (at.relative_pressure() - 1.0)
             + self.with_contraction * (at.relative_contraction() - 1.0);
         // Damping that would drive the muscle is none.
-        force - v * growth * place.max(0.0) * if v > 0.0 { self.contraction } else { self.extension }
+        force - rate * growth * place.max(0.0) * if v > 0.0 { self.contraction } else { self.extension }
     }
 
     fn sentence(&self) -> String {

@@ -82,13 +82,17 @@ impl Search<'_, '_> {
         Some(Chosen { verdict, model, best, without, saw_all: !holds_out, alternatives, rivals, singles })
     }
 
-    /// Drops effects that a hypothesis of several can spare and be possible, the most superfluous first.
+    /// Drops effects that a hypothesis of several can spare and be possible, the most superfluous first: fitted anew without it or, where
+    /// that goes where the others cannot be, as these are beside it.
     fn pruned(&self, judged: Judged) -> Judged {
         let parts = judged.fitted.hypothesis.parts.clone();
         if parts.len() < 2 {
             return judged;
         }
-        let fewer = parts.par_iter().filter_map(|part| self.without(&judged, part)).filter(is_possible);
+        let fewer = parts.par_iter().filter_map(|part| {
+            let as_it_is = || self.bench.neutralised(&judged.fitted, part.effect).map(|fitted| self.judge(fitted));
+            self.without(&judged, part).filter(is_possible).or_else(as_it_is).filter(is_possible)
+        });
         match fewer.max_by(|a, b| a.score.total_cmp(&b.score)) {
             Some(fewer) if !self.is_worth(&fewer, &judged) => self.pruned(fewer),
             _ => judged,
