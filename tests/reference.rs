@@ -133,6 +133,14 @@ fn effects_agree_with_scipy() {
                 ("valve_resonance.lead", 1.0),
             ],
         ),
+        (
+            "slow_regulator",
+            &[
+                ("valve_resonance.natural_frequency", 5.0),
+                ("valve_resonance.damping_ratio", 0.5),
+                ("valve_resonance.lead", 3.0),
+            ],
+        ),
         ("slower_when_short", &[("valve_lag.time_constant", 0.03), ("valve_lag.growth_with_contraction", 0.7)]),
         (
             "averaged_position",
@@ -168,6 +176,18 @@ fn effects_agree_with_scipy() {
                 ("valve_dead_band.pressure_overlap", 6e3),
                 ("valve_dead_band.overlap_steepness", 3.0),
                 ("valve_dead_band.emptying_excess", 1.5),
+            ],
+        ),
+        (
+            "rounded_ports",
+            &[("valve_dead_band.pressure_overlap", 6e3), ("valve_dead_band.overlap_rounding", 2.0 / 3.0)],
+        ),
+        (
+            "thinning_damping",
+            &[
+                ("viscous_damping.contraction", 150.0),
+                ("viscous_damping.extension", 320.0),
+                ("viscous_damping.thinning", 25.0),
             ],
         ),
         (

@@ -200,6 +200,18 @@ class Regulator(Plant):
         return own[0] + 17.5 * (target - pressure)
 
 
+class SlowRegulator(Regulator):
+    """Mostly proportional: it overshoots without ringing."""
+
+    own_scales = (1e5,)
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [25.0 * (target - pressure)]
+
+    def pressure_rate(self, target, pressure, x, own):
+        return own[0] + 15.0 * (target - pressure)
+
+
 class UnevenResonance(Resonance):
     """Damped one and a half times as much while the pressure falls."""
 
@@ -385,6 +397,15 @@ class UnlikePorts(Plant):
         overlap = 6e3 if error > 0 else 15e3
         beyond = np.interp(abs(error), [0, overlap, 1.5 * overlap, 1e6], [0, 0, 1.5 * overlap, 1e6])
         return VALVE_BANDWIDTH * np.sign(error) * beyond
+
+
+class RoundedPorts(Plant):
+    """An overlap of 6 kPa behind the branch z of the hyperbola z (z - |e| + 6 kPa) = (2 kPa)^2, less where that begins."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        error = target - pressure
+        branch = lambda size: max(np.roots([1.0, 6.0 - size, -4.0]).real)
+        return VALVE_BANDWIDTH * np.sign(error) * 1e3 * (branch(abs(error) / 1e3) - branch(0.0))
 
 
 class FlowLimit(Plant):
@@ -697,6 +718,15 @@ class CordFriction(Plant):
         return pull - (9 + 0.04 * abs(pull)) * (1 - 0.6 * (x / 0.1 - 1)) * np.tanh(velocity / 2e-3)
 
 
+class ThinningDamping(Plant):
+    """Eyring: sinh(25 s/m F/B) is 25 s/m times the velocity."""
+
+    def force(self, pressure, x, velocity, own):
+        damping = 150.0 if velocity > 0 else 320.0
+        rate = np.log(25 * velocity + np.sqrt(1 + (25 * velocity) ** 2)) / 25
+        return super().force(pressure, x, velocity, own) - damping * rate
+
+
 STAIRS = staircase([0.8, 1.5, 2.0, 1.2], 1.2)
 THROWS = staircase([2.13, 1.25, 1.9, 1.1], 1.2)
 RAMPS = ramps([(0, 1.0), (0.3, 1.0), (1.5, 2.0), (2.0, 2.0), (2.6, 1.4), (3.0, 1.9), (3.6, 1.2), (4.4, 1.3), (5, 1.3)])
@@ -720,6 +750,7 @@ CASES = [
     Case("relaxation", Relaxation(), STAIRS),
     Case("activated_relaxation", ActivatedRelaxation(), STAIRS),
     Case("regulator", Regulator(), STAIRS),
+    Case("slow_regulator", SlowRegulator(), STAIRS),
     Case("slower_when_short", SlowerWhenShort(), STAIRS),
     Case("uneven_dead_time", UnevenDeadTime(), RAMPS),
     Case("averaged_position", AveragedPosition(), RAMPS),
@@ -735,6 +766,7 @@ CASES = [
     Case("sliding", Sliding(), ramps([(0, 1.0), (0.3, 1.0), (1.2, 1.7), (1.6, 1.7), (2.2, 2.1), (2.8, 1.4), (4, 1.7), (5, 1.7)])),
     Case("overlap", Overlap(), STAIRS),
     Case("unlike_ports", UnlikePorts(), STAIRS),
+    Case("rounded_ports", RoundedPorts(), STAIRS),
     Case("flow_limit", FlowLimit(), STAIRS),
     Case("nozzle", Nozzle(), STAIRS),
     Case("moving_volume", MovingVolume(), STAIRS),
@@ -762,6 +794,7 @@ CASES = [
     Case("wire", Wire(), THROWS),
     Case("laid_rope", LaidRope(), RAMPS),
     Case("threshold", Threshold(), STAIRS),
+    Case("thinning_damping", ThinningDamping(), RAMPS),
     Case("friction", Friction(), RAMPS),
     Case("direct_friction", DirectFriction(), RAMPS),
     Case("sinking_friction", SinkingFriction(), RAMPS),
