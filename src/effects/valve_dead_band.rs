@@ -131,7 +131,11 @@ impl Effect for ValveDeadBand {
         Self { pressure_overlap: 0.0, ..self }
     }
 
+    /// Rounded edges let nothing rest off its target.
     fn rests_off(&self) -> f64 {
+        if self.overlap_rounding > 0.0 {
+            return 0.0;
+        }
         self.start * if self.start > 0.0 { self.overlap_of_emptying() } else { self.pressure_overlap }
     }
 
