@@ -159,8 +159,13 @@ impl Search<'_, '_> {
         if is_plain && self.may_pay(&fits) {
             fits.extend(refined_by(fully.each().filter(|one| *one != fully).collect()));
         }
-        // A refinement that ends where the cause cannot be says nothing of the cause.
-        let better = fits.into_iter().filter(|better| is_possible(better) || !is_possible(&judged));
+        // A refinement that ends where the causes cannot be says nothing of them.
+        let can_be = |fit: Judged| match is_possible(&fit) || !is_possible(&judged) {
+            true => Some(fit),
+            false if fit.score > judged.score => self.possible_instead(&fit).filter(is_possible),
+            false => None,
+        };
+        let better = fits.into_iter().filter_map(can_be);
         better.chain([judged.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(judged)
     }
 
@@ -188,10 +193,17 @@ impl Search<'_, '_> {
         let Some(best) = best.cloned() else { return level };
         let lacks_form = |judged: &Judged| judged.explained > LEAST_EXPLAINED_EXACTLY.0 && !same_effects(judged, &best);
         let (mut close, mut rest): (Vec<_>, Vec<_>) = level.into_iter().partition(lacks_form);
+        close.sort_by_key(|judged| !differ_in_one(judged, &best)); // only these can stand in the place of one of its effects
         rest.extend(close.split_off(close.len().min(MAY_BE_RIVALS)));
         let close = close.into_par_iter().map(|judged| self.in_best_form(judged, Some(&best)));
         sorted(close.chain(rest).collect())
     }
+}
+
+/// Whether hypotheses have all effects in common but one each.
+fn differ_in_one(a: &Judged, b: &Judged) -> bool {
+    let [a, b] = [a, b].map(|judged| judged.fitted.hypothesis.names());
+    a.len() == b.len() && a.iter().filter(|name| !b.contains(name)).count() == 1
 }
 
 /// Ranks of the hypotheses that may rival the best: of those that explain enough the best, and those that explain

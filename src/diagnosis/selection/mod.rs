@@ -226,9 +226,9 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let is_worth = match self.leading(levels) {
             Some(best) => best.fitted.hypothesis.parts.len() == now && asks_for_more(best),
-            None => now == 1,
+            None => now == 1 && !self.is_sound(&self.baseline.losses),
         };
-        now < self.most && is_worth && !self.is_sound(&self.baseline.losses) && !self.unlisted_says_all(levels)
+        now < self.most && is_worth && !self.unlisted_says_all(levels)
     }
 
     /// Whether residuals are small enough to be those of forms or of a sound model.

@@ -180,10 +180,14 @@ impl Search<'_, '_> {
     /// the one whose forms may be why it is not the best.
     fn rivals<'l>(&self, best: &Judged, size: usize, level: &'l [Judged]) -> Vec<&'l Judged> {
         let possible = level.iter().filter(|other| !same_effects(other, best) && is_possible(other));
-        let (equal, behind): (Vec<_>, Vec<_>) =
-            possible.partition(|other| evidence(&other.fitted, &best.fitted) < RIVAL);
-        let by_form = || behind.into_iter().find(|other| self.differ_by_form(best, size, other));
-        if equal.is_empty() { by_form().into_iter().collect() } else { equal }
+        let odds = |other: &&Judged| evidence(&other.fitted, &best.fitted);
+        let (equal, behind): (Vec<_>, Vec<_>) = possible.partition(|other| odds(other) < RIVAL);
+        let by_form = || behind.into_iter().filter(|other| self.differ_by_form(best, size, other));
+        if equal.is_empty() {
+            by_form().min_by(|a, b| odds(a).total_cmp(&odds(b))).into_iter().collect()
+        } else {
+            equal
+        }
     }
 
     /// Whether two hypotheses leave so little that their forms decide between them, and not their causes. A cause in a simpler
