@@ -56,7 +56,7 @@ crate::variables::variables! {
     /// # Reference
     /// K. Åström, T. Hägglund (2006), Advanced PID Control, ISA, section 13.
     pub struct Sampling in "controller." as Fixed {
-        /// Time between two samples; zero for a continuous controller
+        /// Time between two samples, at least 1 µs; zero for a continuous controller
         sample_time: f64 = 0.0, SECOND, (0.0..=10.0);
     }
 }
@@ -204,6 +204,8 @@ fn outputs_now(parameters: &Parameters, inputs: &ControllerInputs, state: &Contr
 
 /// Share of the time between two samples by which an instant may be off by rounding.
 const ROUNDING: f64 = 1e-9;
+/// Shortest time in s between two samples.
+const LEAST_SAMPLE_TIME: f64 = 1e-6;
 
 /// What a sampled controller holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -380,7 +382,9 @@ impl System for PidFeedForward {
         parameters.sampling.sample_time > 0.0 && output != "control_error"
     }
 
-    fn left_range(_: &Parameters, _: &ControllerState) -> Option<&'static str> {
-        None
+    /// A controller that samples so often would keep its caller waiting.
+    fn left_range(parameters: &Parameters, _: &Self::Inputs, _: &ControllerState) -> Option<&'static str> {
+        let sample_time = parameters.sampling.sample_time;
+        (sample_time > 0.0 && sample_time < LEAST_SAMPLE_TIME).then_some("controller.sample_time")
     }
 }

@@ -90,8 +90,20 @@ pub enum Error {
         /// Gauge pressure at the start, Pa.
         gauge_pressure: f64,
     },
+    /// A start outside the range in which the model means anything.
+    #[error(
+        "at the start `{variable}` is out of the range in which the model holds: \
+         check the load, the lengths of the muscle and the first values of the inputs"
+    )]
+    Start {
+        /// What is out of its range.
+        variable: &'static str,
+    },
     /// The simulation left the range in which the model means anything.
-    #[error("the simulation diverged by {time} s: `{variable}` left the range in which the model holds")]
+    #[error(
+        "the simulation diverged by {time} s: `{variable}` left the range in which the model holds; \
+         check the load and the units of the inputs"
+    )]
     Diverged {
         /// Simulated time at which it was noticed, s.
         time: f64,
@@ -129,6 +141,14 @@ pub enum Error {
         path: PathBuf,
         /// What is missing and what to do.
         problem: String,
+    },
+    /// A recording that the model cannot follow.
+    #[error("{}: {problem}", path.display())]
+    Replay {
+        /// The file.
+        path: PathBuf,
+        /// Where the simulation failed.
+        problem: Box<Error>,
     },
     /// A diagnosis from which no experiment can be planned.
     #[error("{}: {problem}", path.display())]

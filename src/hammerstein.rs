@@ -120,7 +120,8 @@ impl Hammerstein {
 /// Identifies a model from the command and the contraction of a recording, and simulates the physical one beside it.
 ///
 /// # Errors
-/// [`Error::Recording`] where command or contraction are missing, or the command never changes; those of the simulation.
+/// [`Error::Recording`] where command or contraction are missing, the motion is prescribed, or the command never changes; those of the
+/// simulation.
 pub fn identify(recording: &Recording, parameters: &Parameters) -> Result<Identified> {
     let lacks = |problem: &str| Error::Recording { path: recording.path.clone(), problem: problem.to_owned() };
     let signal = |signal: Signal| {
@@ -142,7 +143,9 @@ pub fn identify(recording: &Recording, parameters: &Parameters) -> Result<Identi
         lacks("the command changes too little in the first half of the recording, which the model is fitted to")
     })?;
     let replay = replay(parameters, recording)?;
-    let physical = even(replay.get(Signal::Contraction).unwrap_or_default());
+    let physical = replay.get(Signal::Contraction).map(even).ok_or_else(|| {
+        lacks("a motion that is prescribed does not follow the command: record a hanging load and give its `load_mass`")
+    })?;
     let modelled = model.simulate(&command);
     Ok(Identified { model, time, measured, modelled, physical, held_out: chosen })
 }

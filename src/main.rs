@@ -403,11 +403,16 @@ fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Re
     }
     let files = export::write_whole(files)?;
     let text = format!("{}{}", table(rows).text, listed(&files));
-    Ok(Answer { text, json: json!({ "errors": errors, "files": files }) })
+    Ok(Answer { text, json: json!({ "errors": errors, "files": names(&files) }) })
+}
+
+/// The paths as text, which those of some systems are only nearly.
+fn names(files: &[PathBuf]) -> Vec<String> {
+    files.iter().map(|path| path.display().to_string()).collect()
 }
 
 fn listed(files: &[PathBuf]) -> String {
-    files.iter().map(|path| format!("{}\n", path.display())).collect()
+    names(files).into_iter().map(|name| name + "\n").collect()
 }
 
 fn run_identification(
@@ -421,7 +426,7 @@ fn run_identification(
     let found = identify(recordings, parameters, model, braid)?;
     let files = export::write_whole(identification::report::files(&found, out))?;
     let mut json = identification::report::to_json(&found);
-    json["files"] = json!(files);
+    json["files"] = json!(names(&files));
     let mut rows = vec![["parameter", "value", "95 % from", "to", "unit"].map(str::to_owned)];
     let fitted = &found.found.fitted;
     for ((free, value), half) in fitted.structure.free.iter().zip(&fitted.values).zip(&fitted.half_widths) {
@@ -443,7 +448,7 @@ fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path
     let found = hammerstein::identify(recording, parameters)?;
     let files = export::write_whole(found.files(out))?;
     let mut json = found.to_json();
-    json["files"] = json!(files);
+    json["files"] = json!(names(&files));
     Ok(Answer { text: format!("{}\n{}", found.sentence(), listed(&files)), json })
 }
 
@@ -470,7 +475,7 @@ fn run_comparison(
         text += &format!("{}\n\n{}\n", comparison::report::headline(muscle), table(rows).text);
     }
     let mut json = comparison::report::to_json(&found);
-    json["files"] = json!(files);
+    json["files"] = json!(names(&files));
     Ok(Answer { text: text + &listed(&files), json })
 }
 
@@ -487,7 +492,7 @@ fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f
     let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
     let files = export::write_whole(files)?;
     let mut json = report::to_json(&found);
-    json["files"] = json!(files);
+    json["files"] = json!(names(&files));
     Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), json })
 }
 
@@ -519,7 +524,7 @@ fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
     bar.finish_and_clear();
     let files = export::write_whole(plan::files(&found, &nominal, &arguments.out))?;
     let mut json = plan::to_json(&found);
-    json["files"] = json!(files);
+    json["files"] = json!(names(&files));
     Ok(Answer { text: format!("{}\n{}", planned(&found), listed(&files)), json })
 }
 
@@ -546,7 +551,7 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
     let tuning = tuning::tune(&parameters, &masses)?;
     let files = export::write_whole(tuning::files(&tuning, &parameters, &source.source, out))?;
     let mut json = tuning::to_json(&tuning);
-    json["files"] = json!(files);
+    json["files"] = json!(names(&files));
     let controller = &tuning.parameters.controller;
     let worst = tuning.worst();
     let least =
@@ -578,7 +583,7 @@ fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
     bar.finish_and_clear();
     let files = export::write_whole(closed_loop::files(&evaluation, out))?;
     let mut json = closed_loop::to_json(&evaluation);
-    json["files"] = json!(files);
+    json["files"] = json!(names(&files));
     Ok(Answer { text: listed(&files), json })
 }
 
@@ -591,7 +596,7 @@ fn run_reproduction(out: &Path) -> Result<Answer> {
     bar.finish_and_clear();
     let files = export::write_whole(reproduction::files(&found, out))?;
     let mut json = reproduction::to_json(&found);
-    json["files"] = json!(files);
+    json["files"] = json!(names(&files));
     Ok(Answer { text: listed(&files), json })
 }
 
@@ -613,13 +618,13 @@ fn run_demo(out: &Path) -> Result<Answer> {
         told = told(&made.diagnosis),
         diagnosis = out.join("diagnosis").display(),
     );
-    Ok(Answer { text, json: json!({ "files": made.files, "diagnosis": report::to_json(&made.diagnosis) }) })
+    Ok(Answer { text, json: json!({ "files": names(&made.files), "diagnosis": report::to_json(&made.diagnosis) }) })
 }
 
 fn export_fmus(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {
     let files = export::export(parameters, &package::libraries(libraries)?, out)?;
     ssp::warnings(parameters).iter().for_each(|note| eprintln!("note: {note}"));
-    let paths: Vec<_> = files.iter().map(|path| path.display().to_string()).collect();
+    let paths = names(&files);
     Ok(Answer { text: paths.join("\n"), json: json!({ "files": paths }) })
 }
 

@@ -409,6 +409,12 @@ fn understand(
         None => (ours.trim(), None),
     };
     let Some((_, signal, units)) = COLUMNS.iter().find(|(known, ..)| *known == name) else {
+        if ours != header {
+            let known: Vec<&str> = COLUMNS.iter().map(|(known, ..)| *known).collect();
+            let problem =
+                format!("--map gives it the name `{name}`, which no column has; use one of {}", known.join(", "));
+            return Err(Error::Csv { path: path.to_owned(), line: 1, column: Some(header.to_owned()), problem });
+        }
         notes.push(format!("column `{header}` is not used"));
         return Ok(None);
     };
@@ -563,6 +569,9 @@ mod tests {
         let map = [("t", "time [s]"), ("u", "command [V]"), ("x", "contraction [m]")]
             .map(|(theirs, ours)| (theirs.to_owned(), ours.to_owned()));
         assert!(Recording::parse(text.as_bytes(), Path::new("r.csv"), &map).unwrap().notes.is_empty());
+        let slip = [map[0].clone(), map[1].clone(), ("x".to_owned(), "contracton [m]".to_owned())];
+        let refused = Recording::parse(text.as_bytes(), Path::new("r.csv"), &slip).unwrap_err().to_string();
+        assert!(refused.starts_with("r.csv: line 1, column `x`: --map gives it the name `contracton`"), "{refused}");
     }
 
     #[test]

@@ -218,8 +218,8 @@ pub trait System: Copy + Send + 'static {
     fn is_held(_parameters: &Parameters, _output: &str) -> bool {
         false
     }
-    /// Name of a state that has left the range in which the model means anything.
-    fn left_range(parameters: &Parameters, state: &Self::State) -> Option<&'static str>;
+    /// Name of an input or a state that has left the range in which the model means anything.
+    fn left_range(parameters: &Parameters, inputs: &Self::Inputs, state: &Self::State) -> Option<&'static str>;
 
     /// Derivatives of the outputs at a time in s, per second, of a system that is a function of time with jumps, which
     /// no difference may straddle; `None` where differences serve.
@@ -391,11 +391,11 @@ impl<S: System> Simulator<S> {
     /// Puts the system at its start.
     ///
     /// # Errors
-    /// As [`System::initial_state`], and [`Error::Diverged`] for a start out of range; nothing has changed then.
+    /// As [`System::initial_state`], and [`Error::Start`] for a start out of range; nothing has changed then.
     pub fn initialize(&mut self, time: f64) -> Result<()> {
         let state = S::initial_state(&self.parameters, &self.inputs)?;
-        if let Some(variable) = S::left_range(&self.parameters, &state) {
-            return Err(Error::Diverged { time, variable });
+        if let Some(variable) = S::left_range(&self.parameters, &self.inputs, &state) {
+            return Err(Error::Start { variable });
         }
         self.state = state;
         self.clock = Clock { time, start: time };
@@ -482,7 +482,7 @@ impl<S: System> Simulator<S> {
             // On, even where a passage is shorter than rounding.
             after = if span < duration - after { (after + span).max(after.next_up()) } else { duration };
         }
-        match S::left_range(parameters, &state) {
+        match S::left_range(parameters, &inputs.along(&slopes, duration), &state) {
             Some(variable) => Err(Error::Diverged { time: time + duration, variable }),
             None => Ok((state, step)),
         }

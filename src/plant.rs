@@ -233,7 +233,8 @@ fn with_target(parameters: &Parameters, command: f64, at: Point, own: &[f64]) ->
     let commanded_pressure = commanded_pressure(parameters, command, &at, own);
     let at = Point { commanded_pressure, ..at };
     let target_pressure = parameters.effects.target_pressure(&at, own, commanded_pressure);
-    Point { target_pressure: parameters.unknown_cause.target_pressure(&at, target_pressure), ..at }
+    // No valve sucks.
+    Point { target_pressure: parameters.unknown_cause.target_pressure(&at, target_pressure).max(0.0), ..at }
 }
 
 /// Rate of the gauge pressure in Pa/s.
@@ -241,7 +242,9 @@ fn with_target(parameters: &Parameters, command: f64, at: Point, own: &[f64]) ->
 fn pressure_rate(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
     let effects = &parameters.effects;
     let bandwidth = effects.valve_bandwidth(at, parameters.valve.bandwidth);
-    effects.pressure_rate(at, own, bandwidth * (at.target_pressure - at.gauge_pressure))
+    let rate = effects.pressure_rate(at, own, bandwidth * (at.target_pressure - at.gauge_pressure));
+    // Nor does what swings behind it.
+    if at.gauge_pressure > 0.0 { rate } else { rate.max(0.0) }
 }
 
 /// As [`pressure_rate`], without effects.
@@ -254,6 +257,12 @@ fn nominal_pressure_rate(parameters: &Parameters, command: f64, gauge_pressure: 
 #[inline]
 pub fn masses(parameters: &Parameters) -> (f64, f64) {
     parameters.effects.masses(parameters.load.mass)
+}
+
+/// Name of the contraction in m where the muscle would be longer than its threads, or shorter than nothing.
+fn stretched_apart(parameters: &Parameters, contraction: f64) -> Option<&'static str> {
+    let length = parameters.muscle.rest_length - contraction;
+    (!(0.0..=parameters.muscle.thread_length).contains(&length)).then_some("muscle.contraction")
 }
 
 /// Point of a muscle at rest, its valve asking for the pressure that is there.
@@ -425,13 +434,12 @@ impl System for PneumaticMuscle {
         }
     }
 
-    fn left_range(parameters: &Parameters, state: &Self::State) -> Option<&'static str> {
+    fn left_range(parameters: &Parameters, _: &Self::Inputs, state: &Self::State) -> Option<&'static str> {
         let (weighing, moving) = masses(parameters);
         if weighing <= 0.0 || moving <= 0.0 {
             return Some("load.mass with payload_mass");
         }
-        let length = parameters.muscle.rest_length - state.0[1];
-        (!(0.0..=parameters.muscle.thread_length).contains(&length)).then_some("muscle.contraction")
+        stretched_apart(parameters, state.0[1])
     }
 
     #[inline]
@@ -605,8 +613,8 @@ impl System for PneumaticActuator {
         driven_outputs(parameters, clock, &at, own, memory)
     }
 
-    fn left_range(_: &Parameters, _: &Self::State) -> Option<&'static str> {
-        None
+    fn left_range(parameters: &Parameters, inputs: &Self::Inputs, _: &Self::State) -> Option<&'static str> {
+        stretched_apart(parameters, inputs.contraction)
     }
 
     #[inline]
@@ -705,8 +713,8 @@ impl System for MuscleAlone {
         driven_outputs(parameters, clock, &measured_point(inputs), &state.0, &PlantMemory::default())
     }
 
-    fn left_range(_: &Parameters, _: &Self::State) -> Option<&'static str> {
-        None
+    fn left_range(parameters: &Parameters, inputs: &Self::Inputs, _: &Self::State) -> Option<&'static str> {
+        stretched_apart(parameters, inputs.contraction)
     }
 
     #[inline]

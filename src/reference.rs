@@ -122,7 +122,7 @@ impl System for ReferenceTrajectory {
             setpoint_acceleration: 0.0,
         })
     }
-    fn left_range(_: &Parameters, _: &[f64; 0]) -> Option<&'static str> {
+    fn left_range(_: &Parameters, _: &Self::Inputs, _: &[f64; 0]) -> Option<&'static str> {
         None
     }
 }

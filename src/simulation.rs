@@ -12,7 +12,7 @@ use crate::plant::{
 use crate::quality::sensors::resolution;
 use crate::reference::ReferenceTrajectory;
 use crate::variables::Signals;
-use crate::{GRAVITY, Result};
+use crate::{Error, GRAVITY, Result};
 
 /// The signals that a simulation gives and a recording may hold.
 pub const OUTPUTS: [Signal; 3] = [Signal::GaugePressure, Signal::Contraction, Signal::Force];
@@ -60,7 +60,7 @@ const HELD: f64 = 1e-3;
 /// at the one that the first command leads to.
 ///
 /// # Errors
-/// [`crate::Error::NoEquilibrium`], [`crate::Error::Diverged`].
+/// [`Error::Replay`], with what the simulation failed of.
 pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
     replay_within(parameters, recording, TOLERANCE)
 }
@@ -70,6 +70,15 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
 /// # Errors
 /// As [`replay`].
 pub fn replay_within(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
+    replay_chain(parameters, recording, tolerance).map_err(|error| in_file(recording, error))
+}
+
+/// An error with the recording that it is one of.
+fn in_file(recording: &Recording, error: Error) -> Error {
+    Error::Replay { path: recording.path.clone(), problem: Box::new(error) }
+}
+
+fn replay_chain(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
     let mut parameters = in_recording(parameters, recording);
     let Some(command) = recording.bridged(Signal::Command) else {
         return replay_pull(&parameters, recording, tolerance);
@@ -113,7 +122,7 @@ pub(crate) fn in_recording(parameters: &Parameters, recording: &Recording) -> Pa
 /// # Errors
 /// As [`replay`].
 pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
-    replay_pull(&in_recording(parameters, recording), recording, TOLERANCE)
+    replay_pull(&in_recording(parameters, recording), recording, TOLERANCE).map_err(|error| in_file(recording, error))
 }
 
 fn replay_pull(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {

@@ -2,10 +2,11 @@
 
 use proptest::prelude::*;
 use sinew::effects::{Effects, Freed};
-use sinew::model::Model;
+use sinew::model::{Model, Simulator};
 use sinew::model_description::model_description;
 use sinew::models::models;
 use sinew::parameters::Parameters;
+use sinew::plant::PneumaticActuator;
 use sinew::variables::Declared;
 use std::path::{Path, PathBuf};
 
@@ -294,87 +295,30 @@ fn an_extended_plant_starts_at_rest() {
     }
 }
 
+/// Parameters with those of effects moved a quarter of the way to a bound, but for those that switch an effect on; and the names of these.
+fn with_shapes_moved(nominal: &Parameters) -> (Parameters, Vec<&'static str>) {
+    let (mut moved, mut shapes) = (*nominal, Vec::new());
+    nominal.visit(&mut |variable, value| {
+        if !Effects::DESCRIPTIONS.iter().any(|effect| effect.name == variable.group()) {
+            return;
+        }
+        let bound = if value < variable.max { variable.max } else { variable.min };
+        let mut next = moved;
+        next.set(variable.name, value + 0.25 * (bound - value)).unwrap();
+        if next.effects.are_neutral() {
+            moved = next;
+            shapes.push(variable.name);
+        }
+    });
+    (moved, shapes)
+}
+
 #[test]
 fn neutral_effects_change_nothing_to_the_last_bit() {
-    // The nominal model with every shape parameter of an effect moved, but no effect switched on.
+    // The nominal model with every parameter of an effect moved that does not switch it on.
     let nominal = Parameters::default();
-    let mut moved = nominal;
-    for (parameter, value) in [
-        ("friction_hysteresis.presliding_displacement", 0.05),
-        ("friction_hysteresis.with_contraction", 0.3),
-        ("friction_hysteresis.second_share", 0.3),
-        ("friction_hysteresis.second_ratio", 9.0),
-        ("friction_hysteresis.knee", 2.0),
-        ("friction_hysteresis.unloading", 0.3),
-        ("friction_hysteresis.smoothing_velocity", 0.03),
-        ("friction_hysteresis.stribeck_share", 0.5),
-        ("friction_hysteresis.stribeck_velocity", 0.03),
-        ("friction_hysteresis.start", 0.7),
-        ("viscous_damping.exponent", 0.5),
-        ("creep.time_1", 1.0),
-        ("creep.time_2", 30.0),
-        ("creep.relaxed_share", 0.2),
-        ("creep.settled_share", 0.6),
-        ("creep.nominal_share", 0.5),
-        ("creep.activation", 100.0),
-        ("threshold_pressure.fade", 1e5),
-        ("threshold_pressure.exponent", 2.0),
-        ("threshold_pressure.onset", 0.5e5),
-        ("threshold_pressure.decrease_with_contraction", 0.5),
-        ("series_elasticity.exponent", 0.7),
-        ("series_elasticity.toe_force", 100.0),
-        ("valve_lag.growth_with_pressure", 0.5),
-        ("valve_lag.emptying_excess", 0.5),
-        ("valve_resonance.damping_ratio", 0.2),
-        ("valve_resonance.emptying_excess", 0.5),
-        ("valve_resonance.stiffening", 0.5),
-        ("valve_dead_band.play_spread", 0.5),
-        ("valve_dead_band.emptying_excess", 0.5),
-        ("valve_dead_band.start", 1.0),
-        ("supply_saturation.sharpness", 8.0),
-        ("supply_saturation.droop", 0.5),
-        ("supply_saturation.usage", 2.0),
-        ("supply_saturation.recovery_time", 2.0),
-        ("supply_saturation.span", 0.5e5),
-        ("flow_limit.roundness", 0.5),
-        ("flow_limit.emptying_with_pressure", 0.5),
-        ("flow_limit.volume_growth", 0.5),
-        ("flow_limit.volume_bend", 0.1),
-        ("flow_limit.polytropic_exponent", 1.2),
-        ("leakage.choked_share", 0.5),
-        ("leakage.volume_growth", 0.5),
-        ("leakage.shut_after", 0.5),
-        ("leakage.opening_with_contraction", 0.5),
-        ("leakage.opening_pressure", 0.5e5),
-        ("leakage.opening_contraction", 0.05),
-        ("end_effects.growth", 0.5),
-        ("end_effects.taper_length", 0.05),
-        ("end_effects.elastic_share", 0.5),
-        ("force_gain.elastic_share", 0.5),
-        ("force_gain.recording", 2.0),
-        ("payload_mass.recording", 2.0),
-        ("bladder_stiffness.added_growth", 0.5),
-        ("bladder_stiffness.added_curvature", 0.5),
-        ("valve_gain.knee", 1.0),
-        ("valve_dead_time.falling_excess", 0.5),
-        ("valve_lag.growth_with_contraction", 0.5),
-        ("valve_resonance.lead", 0.5),
-        ("temperature_drift.time_constant", 5.0),
-        ("temperature_drift.work_share", 0.5),
-        ("temperature_drift.speed_share", 0.5),
-        ("temperature_drift.share_2", 0.5),
-        ("temperature_drift.time_constant_2", 5.0),
-        ("temperature_drift.second", 0.5),
-        ("temperature_drift.recording", 2.0),
-        ("valve_dead_band.sliding_speed", 0.5),
-        ("valve_offset.settling_time", 5.0),
-        ("valve_offset.swing_period", 9.0),
-        ("valve_offset.recording", 2.0),
-        ("contraction_sensor_offset.swing_phase", 0.5),
-        ("pressure_sensor_offset.shift_time", 5.0),
-    ] {
-        moved.set(parameter, value).unwrap();
-    }
+    let (moved, shapes) = with_shapes_moved(&nominal);
+    assert!(shapes.len() > 100, "only {shapes:?}");
     assert!(moved.effects.are_neutral());
     // Alone, and beside an effect that is at work, where all hooks are called.
     let at_work = [nominal, moved].map(|mut parameters| {
@@ -408,6 +352,27 @@ fn a_correction_without_a_cause_is_neutral_until_it_acts_on_something() {
         let mut acting = set;
         acting.set("unknown_cause.acts_on", place).unwrap();
         assert_ne!(course(&set), course(&acting), "{place}");
+    }
+}
+
+#[test]
+fn no_effect_takes_the_pressure_below_ambient() {
+    for effect in Effects::DESCRIPTIONS {
+        for form in effect.all_forms() {
+            let mut parameters = Parameters::default();
+            form.iter().for_each(|(name, starts)| parameters.set(name, starts[0]).unwrap());
+            let mut model = Simulator::<PneumaticActuator>::new(parameters);
+            model.inputs.contraction = 0.05;
+            model.inputs.command = 4.0;
+            model.initialize(0.0).unwrap();
+            model.advance(1.0).unwrap();
+            model.inputs.command = 0.0;
+            for _ in 0..300 {
+                model.advance(0.01).unwrap();
+                let pressure = model.outputs().gauge_pressure;
+                assert!(pressure > -1.0, "{} in {form:?}: {pressure} Pa", effect.name);
+            }
+        }
     }
 }
 

@@ -77,3 +77,11 @@ fn what_is_missing_is_said() {
     let said = identify(&recording, &Parameters::default()).unwrap_err().to_string();
     assert!(said.contains("`contraction [m]`"), "{said}");
 }
+
+#[test]
+fn a_prescribed_motion_is_refused() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/prescribed_motion.csv");
+    let recordings = read_all(&[path], &[]).unwrap();
+    let refused = identify(&recordings[0], &Parameters::default()).unwrap_err().to_string();
+    assert!(refused.contains("load_mass"), "{refused}");
+}

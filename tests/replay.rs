@@ -110,3 +110,15 @@ fn a_prescribed_motion_is_replayed() {
         }
     }
 }
+
+#[test]
+fn a_motion_beyond_the_threads_is_refused_with_its_file() {
+    let rows = (0..200).fold("time [s],command [V],contraction [m],force [N]\n".to_owned(), |mut text, k| {
+        writeln!(text, "{},{},{},300", STEP * f64::from(k), 1.5, -0.02 - 1e-3 * f64::from(k)).unwrap();
+        text
+    });
+    for preset in ["dmsp-40-1000", "dmsp-40-1000/improved-mckibben"] {
+        let refused = replay(&Parameters::load(preset).unwrap(), &parse(&rows)).unwrap_err().to_string();
+        assert!(refused.contains("simulated.csv") && refused.contains("muscle.contraction"), "{refused}");
+    }
+}

@@ -135,6 +135,9 @@ fn empirical(muscle: &OnMuscle) -> Option<Claim> {
     let is_empirical = |a: &&Assessed| EMPIRICAL.contains(&model_name(a.fitted.structure.model));
     let empirical = muscle.models.iter().find(is_empirical)?;
     let other = muscle.models.iter().find(|a| !is_empirical(a))?;
+    if [empirical, other].iter().any(|a| a.held_out_rms().is_infinite()) {
+        return None; // nothing could be left out
+    }
     let told = |a: &Assessed| format!("{} with {:.1} N", a.fitted.structure.label(), a.held_out_rms());
     let seen = format!(
         "On points that the fits did not see, the best empirical model is {}, the best of the others {}.",

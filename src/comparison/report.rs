@@ -180,6 +180,13 @@ pub fn table_of(muscle: &OnMuscle) -> Vec<Vec<String>> {
 pub fn headline(muscle: &OnMuscle) -> String {
     muscle.models.first().map_or_else(String::new, |best| {
         let share = 100.0 * best.errors.rms / full_scale(muscle);
+        if best.held_out_rms().is_infinite() {
+            return format!(
+                "{}: no model can be trusted: the points allow none to be left out, by which {} would be judged; fitted to all, {:.1} N rms or \
+                 {share:.1} % of full scale.",
+                muscle.name, best.fitted.structure.label(), best.errors.rms
+            );
+        }
         format!(
             "{}: best on pressures that the fit did not see is {}, {:.1} N rms there; fitted to all, {:.1} N rms or {share:.1} % of full scale.",
             muscle.name, best.fitted.structure.label(), best.held_out_rms(), best.errors.rms

@@ -23,12 +23,12 @@ pub use correction::Correction;
 pub use fits::FittedParameter;
 pub use remaining::Remaining;
 
+use crate::Result;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality;
 use crate::simulation::replay;
 use crate::variables::Declared;
-use crate::{Error, Result};
 use fits::{Bench, Fitted};
 use hypothesis::{Off, Part, recordings_for};
 use residuals::Data;
@@ -161,10 +161,7 @@ pub fn diagnose(
     for recording in recordings {
         replay(nominal, recording)?; // a model that cannot be simulated at all is the user's to mend
     }
-    let cannot_follow = || Error::Recording {
-        path: recordings[0].path.clone(),
-        problem: "the model cannot follow the recording: check `load_mass` and the units".to_owned(),
-    };
+    let cannot_follow = || residuals::cannot_follow(recordings);
     let data = Data::new(recordings, nominal, tolerance)?;
     let thinned = thinned(recordings);
     let prepared = |off: &Off| {

@@ -92,11 +92,17 @@ impl Scope {
     }
 }
 
+/// Recordings whose simulation gives nothing to compare.
+pub fn cannot_follow(recordings: &[Recording]) -> Error {
+    let problem = "the model cannot follow the recording: check `load_mass` and the units".to_owned();
+    Error::Recording { path: recordings[0].path.clone(), problem }
+}
+
 impl<'a> Data<'a> {
     /// Looks at recordings before any fit.
     ///
     /// # Errors
-    /// [`Error::Recording`] where a recording is too short, or no measured signal can be judged.
+    /// [`Error::Recording`] where a recording is too short, no measured signal can be judged, or the model cannot follow.
     pub fn new(recordings: &'a [Recording], nominal: &Parameters, tolerance: f64) -> Result<Self> {
         if let Some(short) = recordings.iter().find(|recording| recording.time.len() < FEWEST_SAMPLES) {
             let problem = format!("too short for a diagnosis: it takes at least {FEWEST_SAMPLES} samples");
@@ -123,9 +129,8 @@ impl<'a> Data<'a> {
                     .to_owned(),
             });
         }
-        if let Some(residuals) = data.residuals(nominal) {
-            data.noise = data.noise_in(&residuals);
-        }
+        let residuals = data.residuals(nominal).ok_or_else(|| cannot_follow(recordings))?;
+        data.noise = data.noise_in(&residuals);
         data.mistimed = data.mistiming(nominal).unwrap_or_else(|| vec![0.0; data.count()]);
         Ok(data)
     }

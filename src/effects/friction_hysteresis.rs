@@ -94,10 +94,15 @@ impl FrictionHysteresis {
         velocity * (1.0 - loading * z.abs().powf(self.knee))
     }
 
+    /// Velocity in m/s within which it sets in, where it goes by velocity.
+    fn smoothing(&self) -> f64 {
+        self.smoothing_velocity.max(LEAST_SMOOTHING)
+    }
+
     /// Share of the half width that acts, with its sign.
     fn engaged(&self, velocity: f64, own: &[f64]) -> f64 {
         if self.smoothing_velocity > 0.0 {
-            return (velocity / self.smoothing_velocity.max(LEAST_SMOOTHING)).tanh();
+            return (velocity / self.smoothing()).tanh();
         }
         (1.0 - self.second_share) * own[0] + self.second_share * own[1]
     }
@@ -163,10 +168,10 @@ impl Effect for FrictionHysteresis {
     }
 
     fn start_velocity(&self) -> f64 {
-        if self.is_neutral() {
+        if self.is_neutral() || self.smoothing_velocity == 0.0 {
             return 0.0;
         }
-        self.smoothing_velocity * self.engaged_at_start().clamp(-FULLY, FULLY).atanh()
+        self.smoothing() * self.engaged_at_start().clamp(-FULLY, FULLY).atanh()
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {

@@ -13,7 +13,8 @@
 //!
 //! # Reference
 //! G. Golub and V. Pereyra (1973), doi 10.1137/0710036; P. Huber (1964), doi 10.1214/aoms/1177703732; H. White (1980),
-//! doi 10.2307/1912934; J. MacKinnon and H. White (1985), doi 10.1016/0304-4076(85)90158-7; effective size as of a first-order autoregression, doi 10.1175/1520-0442 (Zwiers and von Storch 1995).
+//! doi 10.2307/1912934; J. MacKinnon and H. White (1985), doi 10.1016/0304-4076(85)90158-7; effective size as of a first-order autoregression (F. Zwiers and H. von Storch 1995,
+//! J. Climate 8, 336–351).
 
 use super::points::{Point, median, thinned};
 use super::structure::{Parameter, Structure, forces};
