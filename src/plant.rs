@@ -309,6 +309,23 @@ pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) 
     (target + parameters.effects.rests_off()).max(0.0)
 }
 
+/// Rates of gauge pressure in Pa, contraction in m and its velocity in m/s of a load that hangs, in SI units per second, under a command in V;
+/// with the effects as they are where that rests.
+pub fn quasi_steady_rates(
+    parameters: &Parameters,
+    [pressure, contraction, velocity]: [f64; 3],
+    command: f64,
+) -> [f64; 3] {
+    let still = Parameters { effects: parameters.effects.at_rest(), ..*parameters };
+    let own = effects_at_start(&still, &moved(pressure, contraction, velocity));
+    let at_rest = Extended([0.0; 3 + Effects::STATES]);
+    let (mut state, mut rates) = (at_rest, at_rest);
+    state.0[..3].copy_from_slice(&[pressure, contraction, velocity]);
+    state.0[3..].copy_from_slice(&own);
+    PneumaticMuscle::rates(&still, &MuscleInputs { command, external_force: 0.0 }, &state, &mut rates);
+    [rates.0[0], rates.0[1], rates.0[2]]
+}
+
 /// Gauge pressure in Pa at which a weight in N hangs still at a contraction in m; see [`ForceModels::holding_pressure`].
 ///
 /// [`ForceModels::holding_pressure`]: crate::muscle::ForceModels::holding_pressure

@@ -224,6 +224,26 @@ fn dry_friction_of_the_force_model_is_not_taken_for_damping() {
 }
 
 #[test]
+fn an_extended_muscle_is_tuned_as_it_is() {
+    for (effect, values) in [
+        ("series_elasticity", &[("load_compliance", 5e-6)][..]),
+        ("valve_lag", &[("second_time_constant", 0.05)]),
+        ("valve_resonance", &[("natural_frequency", 30.0), ("damping_ratio", 0.5)]),
+        ("leakage", &[("rate", 0.3)]),
+        ("viscous_damping", &[("contraction", 200.0), ("extension", 200.0)]),
+    ] {
+        let mut parameters = preset("dmsp-40-1000");
+        values.iter().for_each(|(name, value)| parameters.set(&format!("{effect}.{name}"), *value).unwrap());
+        let tuning = tune(&parameters, &LOADS).unwrap_or_else(|refused| panic!("{effect}: {refused}"));
+        for case in cases().into_iter().filter(|case| case.muscle == "dmsp-40-1000") {
+            let outcome = outcome(&tuning.parameters, &case, &Unknown::default()).unwrap();
+            println!("{effect}, {} kg: {outcome:?}", case.mass);
+            assert!(outcome.left < SETTLED && outcome.swing < LIMIT_CYCLE, "{effect}, {} kg: {outcome:?}", case.mass);
+        }
+    }
+}
+
+#[test]
 fn the_tuned_loop_meets_the_bar_in_all_18_cases() {
     let outcomes = outcomes(Parameters::preset, &Unknown::default()).unwrap();
     let worst = outcomes.iter().map(|outcome| outcome.largest_error).fold(0.0, f64::max);

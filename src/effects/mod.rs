@@ -188,6 +188,10 @@ pub trait Effect: Declared + Default {
     fn in_recording(&mut self, number: f64) {
         self.visit_mut(&mut |variable, old| if variable.name.ends_with(".recording") { number } else { old });
     }
+    /// By how much later in s the valve answers on average than one of first order with a bandwidth in rad/s.
+    fn lateness(&self, _bandwidth: f64) -> f64 {
+        0.0
+    }
     /// As it acts on where the valve comes to rest, but for what [`Effect::rests_off`] says.
     fn at_rest(self) -> Self {
         self
@@ -397,6 +401,11 @@ macro_rules! effects {
             /// Gauge pressure in Pa by which the valve rests off its target.
             pub fn rests_off(&self) -> f64 {
                 0.0 $(+ self.$field.rests_off())*
+            }
+
+            /// By how much later in s the valve answers on average than one of first order with a bandwidth in rad/s.
+            pub fn lateness(&self, bandwidth: f64) -> f64 {
+                0.0 $(+ self.$field.lateness(bandwidth))*
             }
 
             /// Velocity in m/s with which a load that hangs starts.

@@ -80,6 +80,10 @@ impl Effect for ValveLag {
         Self { second_time_constant: 0.0, third_time_constant: 0.0, ..self }
     }
 
+    fn lateness(&self, _bandwidth: f64) -> f64 {
+        self.second_time_constant + self.third_time_constant
+    }
+
     fn start(&self, at: &Point, own: &mut [f64]) {
         own.fill(at.gauge_pressure);
     }

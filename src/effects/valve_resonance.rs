@@ -126,6 +126,15 @@ impl Effect for ValveResonance {
         Self::default()
     }
 
+    /// It takes the place of the valve of first order.
+    fn lateness(&self, bandwidth: f64) -> f64 {
+        if self.is_neutral() {
+            return 0.0;
+        }
+        let of_pilot = 2.0 * self.damping_ratio * (1.0 - self.lead) / self.natural_frequency;
+        (of_pilot + self.main_stage - 1.0 / bandwidth).max(0.0)
+    }
+
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
         let (frequency, rate) = (self.natural_frequency, self.pilot_rate(at, own));
         let mut error = self.error(at, own);

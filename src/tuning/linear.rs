@@ -2,9 +2,8 @@
 
 use crate::GRAVITY;
 use crate::controller::Controller;
-use crate::model::{State, System};
 use crate::parameters::Parameters;
-use crate::plant::{MuscleInputs, PneumaticMuscle, masses, resting_pressure};
+use crate::plant::{masses, quasi_steady_rates, resting_pressure};
 use nalgebra::{Complex, DMatrix};
 
 /// Polynomial in s: coefficients of 1, s, s², …
@@ -60,7 +59,8 @@ const SLIPPING: f64 = 0.05;
 /// V; the command acts after a `dead_time`. The transfer function from u to x is b e^(−sθ)/(s³ + d₂ s² + d₁ s + d₀).
 ///
 /// # Validity
-/// States of effects rest. Damping is the least of that at rest and that in motion.
+/// States of effects follow at once, but what comes after a first order of the valve is dead time, as long as it is late on average: a valve
+/// that rings is taken for one that does not. Damping is the least of that at rest and that in motion.
 ///
 /// # Reference
 /// Thesis eq. 5.5 drops the stiffness −∂F/∂x, the damping and the area ∂F/∂p.
@@ -83,13 +83,7 @@ impl LinearPlant {
         let pressure = resting_pressure(parameters, contraction, weighing * GRAVITY);
         let rest = [pressure, contraction, 0.0];
         let command = pressure / parameters.valve.gain;
-        let rates_at = |states: &[f64; 3], command: f64| {
-            let (mut state, mut rates) = (<PneumaticMuscle as System>::State::ZERO, State::ZERO);
-            state.as_mut_slice()[..3].copy_from_slice(states);
-            let inputs = MuscleInputs { command, external_force: 0.0 };
-            PneumaticMuscle::rates(parameters, &inputs, &state, &mut rates);
-            [rates.as_slice()[0], rates.as_slice()[1], rates.as_slice()[2]]
-        };
+        let rates_at = |states: &[f64; 3], command: f64| quasi_steady_rates(parameters, *states, command);
         let mut rates = [[0.0; 3]; 3];
         for (column, step) in [1.0, 1e-6, 1e-6].into_iter().enumerate() {
             let (mut above, mut below) = (rest, rest);
@@ -107,7 +101,8 @@ impl LinearPlant {
         rates[2][2] = [SLIPPING, -SLIPPING].map(slope_at).into_iter().fold(rates[2][2], f64::max);
         let step = 1e-4;
         let input = (rates_at(&rest, command + step)[0] - rates_at(&rest, command - step)[0]) / (2.0 * step);
-        let dead_time = parameters.effects.command_delay();
+        let effects = &parameters.effects;
+        let dead_time = effects.command_delay() + effects.lateness(parameters.valve.bandwidth);
         Self { rates, input, dead_time, mass }
     }
 
