@@ -186,8 +186,9 @@ struct PlanArguments {
     /// Diagnosis that left something open [default: sinew-diagnosis/diagnosis.json where it is there]
     #[arg(value_name = "diagnosis.json", conflicts_with = "effects")]
     diagnosis: Option<PathBuf>,
-    #[command(flatten)]
-    parameters: ParameterSource,
+    /// Preset or TOML file of the model that was diagnosed [default: nominal.toml beside the diagnosis, or else dmsp-40-1000]
+    #[arg(long = "parameters", value_name = "FILE|PRESET")]
+    nominal: Option<String>,
     /// Effects to tell apart instead, at a usual size; or `all`
     #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
     effects: Vec<String>,
@@ -206,20 +207,40 @@ struct PlanArguments {
     /// Longest single recording, s
     #[arg(long, default_value_t = plan::USUAL_DURATION, value_parser = |text: &str| quantity(text, Signal::Time))]
     duration: f64,
-    /// Relative error of the nominal coefficients that is no cause
-    #[arg(long, default_value_t = diagnosis::DEFAULT_TOLERANCE, value_parser = tolerance)]
-    tolerance: f64,
+    /// Relative error of the nominal coefficients that is no cause [default: that of the diagnosis, or else 0.03]
+    #[arg(long, value_parser = tolerance)]
+    tolerance: Option<f64>,
     /// Folder for plan.csv, plan.json and the plots
     #[arg(long, default_value = "sinew-plan")]
     out: PathBuf,
 }
 
 impl PlanArguments {
-    /// What is to be told apart.
-    fn task(&self, nominal: &Parameters) -> Result<Task> {
+    /// The diagnosis that it is about.
+    fn of_diagnosis(&self) -> Option<&Path> {
         let usual = Path::new("sinew-diagnosis/diagnosis.json");
         let there = || (self.effects.is_empty() && usual.is_file()).then_some(usual);
-        if let Some(path) = self.diagnosis.as_deref().or_else(there)
+        self.diagnosis.as_deref().or_else(there)
+    }
+
+    /// The model that was diagnosed.
+    fn nominal(&self) -> Result<Parameters> {
+        let beside = self.of_diagnosis().map(|path| path.with_file_name("nominal.toml"));
+        match (&self.nominal, beside) {
+            (Some(given), _) => Parameters::load(given),
+            (None, Some(beside)) if beside.is_file() => Parameters::load(&beside.display().to_string()),
+            (None, beside) => {
+                if let Some(beside) = beside {
+                    eprintln!("note: there is no {}: planned for {USUAL_MUSCLE}", beside.display());
+                }
+                Parameters::load(USUAL_MUSCLE)
+            }
+        }
+    }
+
+    /// What is to be told apart.
+    fn task(&self, nominal: &Parameters) -> Result<Task> {
+        if let Some(path) = self.of_diagnosis()
             && let Some(task) = Task::of_diagnosis(path, nominal)?
         {
             return Ok(task);
@@ -258,10 +279,13 @@ fn quantity(text: &str, signal: Signal) -> std::result::Result<f64, String> {
     }
 }
 
+/// The muscle that is meant where none is named.
+const USUAL_MUSCLE: &str = "dmsp-40-1000";
+
 #[derive(Args)]
 struct ParameterSource {
     /// Preset (see `sinew list presets`) or TOML file
-    #[arg(long = "parameters", value_name = "FILE|PRESET", default_value = "dmsp-40-1000")]
+    #[arg(long = "parameters", value_name = "FILE|PRESET", default_value = USUAL_MUSCLE)]
     source: String,
 }
 
@@ -283,12 +307,17 @@ struct RecordingSource {
 
 impl RecordingSource {
     fn read(&self) -> Result<Vec<Recording>> {
-        let recordings = measurement::read_all(&self.files, &self.renamed)?;
-        for recording in &recordings {
-            recording.notes.iter().for_each(|note| eprintln!("note: {}: {note}", recording.name()));
-        }
-        Ok(recordings)
+        read_recordings(&self.files, &self.renamed)
     }
+}
+
+/// Reads recordings and says what of them is not used.
+fn read_recordings(files: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<Recording>> {
+    let recordings = measurement::read_all(files, renamed)?;
+    for recording in &recordings {
+        recording.notes.iter().for_each(|note| eprintln!("note: {}: {note}", recording.name()));
+    }
+    Ok(recordings)
 }
 
 fn renaming(text: &str) -> std::result::Result<(String, String), String> {
@@ -459,11 +488,16 @@ fn run_comparison(
     out: &Path,
 ) -> Result<Answer> {
     let models = if models.is_empty() { all_models() } else { models };
+    let stem = |source: &String| match Path::new(source) {
+        path if path.is_file() => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        _ => source.clone(),
+    };
+    let stems: Vec<String> = muscles.iter().map(|(source, _)| stem(source)).collect();
     let read = |(source, files): (String, Vec<PathBuf>)| -> Result<Muscle> {
         let given = Parameters::load(&source)?;
-        let stem = Path::new(&source).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let name = if Path::new(&source).is_file() { stem } else { source };
-        Ok(Muscle { name, given, recordings: measurement::read_all(&files, renamed)? })
+        let short = stem(&source);
+        let name = if stems.iter().filter(|other| **other == short).count() > 1 { source } else { short };
+        Ok(Muscle { name, given, recordings: read_recordings(&files, renamed)? })
     };
     let found = compare(muscles.into_iter().map(read).collect::<Result<_>>()?, &models)?;
     let files = export::write_whole(comparison::report::files(&found, out))?;
@@ -514,10 +548,11 @@ fn told(found: &Diagnosis) -> String {
 }
 
 fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
-    let (nominal, limits) = (arguments.parameters.load()?, arguments.limits());
+    let (nominal, limits) = (arguments.nominal()?, arguments.limits());
     let task = arguments.task(&nominal)?;
+    let tolerance = arguments.tolerance.or(task.tolerance).unwrap_or(diagnosis::DEFAULT_TOLERANCE);
     let bar = progress(plan::pieces(&limits));
-    let found = plan::plan(&task, &nominal, arguments.tolerance, &limits, &|name| {
+    let found = plan::plan(&task, &nominal, tolerance, &limits, &|name| {
         bar.set_message(name.to_owned());
         bar.inc(1);
     })?;
@@ -684,20 +719,31 @@ fn list_effects() -> Answer {
 }
 
 fn list_variables() -> Answer {
-    let mut rows = Vec::new();
+    let (mut rows, mut all) = (Vec::new(), Vec::new());
     for model in models() {
         let interface = model.interface();
         for (position, variable) in interface.variables.iter().enumerate() {
-            let declaration = variable.declaration;
-            rows.push(vec![
-                ("fmu", interface.name.to_owned()),
-                ("name", variable.name.to_owned()),
-                ("role", format!("{:?}", declaration.role).to_lowercase()),
-                ("unit", declaration.unit.symbol.to_owned()),
-                ("value", model.get(position).to_string()),
-                ("description", declaration.description.to_owned()),
-            ]);
+            let (declaration, value) = (variable.declaration, model.get(position));
+            let choice = declaration.choice(value);
+            let shown = choice.map_or_else(|| value.to_string(), str::to_owned);
+            let value = choice.map_or_else(|| json!(value), |name| json!(name));
+            let words = [
+                ("fmu", interface.name),
+                ("name", variable.name),
+                ("role", declaration.role_name()),
+                ("unit", declaration.unit.symbol),
+                ("value", &shown),
+                ("description", declaration.description),
+            ];
+            rows.push(words.iter().map(|(key, text)| (*key, (*text).to_owned())).collect());
+            let mut object: serde_json::Map<_, _> =
+                words.iter().map(|(key, text)| ((*key).to_owned(), json!(text))).collect();
+            object.extend(
+                [("value", value), ("min", json!(declaration.min)), ("max", json!(declaration.max))]
+                    .map(|(key, value)| (key.to_owned(), value)),
+            );
+            all.push(Value::Object(object));
         }
     }
-    table(rows)
+    Answer { text: table(rows).text, json: Value::Array(all) }
 }

@@ -4,7 +4,6 @@ use crate::effects::Effects;
 use crate::model::Interface;
 use crate::model_description::model_description;
 use crate::parameters::Parameters;
-use crate::variables::Kind;
 use crate::{Error, Result};
 use minijinja::context;
 use std::io::{Cursor, Write};
@@ -106,13 +105,12 @@ fn documentation(interface: &Interface, parameters: &Parameters) -> String {
         .iter()
         .map(|variable| {
             let declaration = variable.declaration;
-            let start = parameters.find(declaration.name).map(|(_, value)| match declaration.kind {
-                Kind::Real => short(value),
-                Kind::Enumeration(_, choices) => choices[value as usize - 1].name.to_owned(),
-            });
+            let start = parameters
+                .find(declaration.name)
+                .map(|(_, value)| declaration.choice(value).map_or_else(|| short(value), str::to_owned));
             context! {
                 name => variable.name,
-                role => format!("{:?}", declaration.role).to_lowercase(),
+                role => declaration.role_name(),
                 unit => declaration.unit.symbol,
                 description => declaration.description,
                 start,

@@ -282,10 +282,7 @@ impl Parameters {
                 let _ = writeln!(text, "{}[{group}]", if table.is_empty() { "" } else { "\n" });
                 table = group;
             }
-            let written = match variable.kind {
-                Kind::Real => format!("{value:?}"),
-                Kind::Enumeration(_, choices) => format!("{:?}", choices[value as usize - 1].name),
-            };
+            let written = variable.choice(value).map_or_else(|| format!("{value:?}"), |name| format!("{name:?}"));
             let _ = writeln!(text, "{key} = {written}  # {}: {}", variable.unit.symbol, variable.description);
         });
         text

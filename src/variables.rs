@@ -132,6 +132,25 @@ impl Variable {
         self.role == Role::Tunable && matches!(self.kind, Kind::Real)
     }
 
+    /// Name of the choice that a value stands for; `None` for a real number.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub fn choice(&self, value: f64) -> Option<&'static str> {
+        match self.kind {
+            Kind::Real => None,
+            Kind::Enumeration(_, choices) => choices.get((value as usize).saturating_sub(1)).map(|choice| choice.name),
+        }
+    }
+
+    /// What it is to the model, in a word.
+    pub fn role_name(&self) -> &'static str {
+        match self.role {
+            Role::Input => "input",
+            Role::Output => "output",
+            _ if self.is_tunable() => "tunable",
+            _ => "fixed",
+        }
+    }
+
     /// Checks a value against this declaration.
     ///
     /// # Errors

@@ -45,8 +45,8 @@ pub struct Cross {
 /// Parameters from each muscle to each other; the braid is as given.
 pub fn between(muscles: &[OnMuscle]) -> Vec<Cross> {
     let mut all = Vec::new();
-    for of in muscles {
-        for on in muscles.iter().filter(|on| on.name != of.name) {
+    for (index, of) in muscles.iter().enumerate() {
+        for (_, on) in muscles.iter().enumerate().filter(|(other, _)| *other != index) {
             for model in of.models.iter().filter(|model| model.fitted.structure.braid == Braid::Given) {
                 let name = model.fitted.structure.model;
                 let own = on

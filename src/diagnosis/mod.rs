@@ -22,6 +22,7 @@ mod ways;
 pub use correction::Correction;
 pub use fits::FittedParameter;
 pub use remaining::Remaining;
+pub use residuals::HeldOut;
 
 use crate::Result;
 use crate::measurement::{Recording, Signal};
@@ -31,8 +32,7 @@ use crate::simulation::replay;
 use crate::variables::Declared;
 use fits::{Bench, Fitted};
 use hypothesis::{Off, Part, recordings_for};
-use residuals::Data;
-use residuals::Scope;
+use residuals::{Data, Scope};
 use selection::{Chosen, Judged, MOST_EFFECTS};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -118,6 +118,8 @@ pub struct Ranked {
 pub struct Diagnosis {
     /// What was found.
     pub verdict: Verdict,
+    /// Relative error of the nominal coefficients below which nothing was called wrong.
+    pub tolerance: f64,
     /// The causes, the largest first.
     pub causes: Vec<Cause>,
     /// Errors per signal.
@@ -125,7 +127,7 @@ pub struct Diagnosis {
     /// 1 − error of the extended model / error of the nominal one, held out, each signal weighted by its noise.
     pub improvement: f64,
     /// Which samples no fit saw.
-    pub held_out: String,
+    pub held_out: Vec<HeldOut>,
     /// Whether the fit saw those as well, because the others do not tell the size of a cause precisely enough to foretell
     /// them, or are only foretold by them.
     pub saw_all: bool,
@@ -231,6 +233,7 @@ fn answer(
     let unexplained = chosen.verdict == Verdict::Unexplained;
     Some(Diagnosis {
         verdict: chosen.verdict,
+        tolerance: data.tolerance,
         correction: if unexplained { correction::correction(bench, &extended) } else { None },
         causes: causes(chosen, nominal, &parameters),
         signals: signals.collect(),

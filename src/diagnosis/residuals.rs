@@ -50,7 +50,8 @@ pub struct Data<'a> {
     /// Per residual, the error in SI that the pressure at the start of its recording leaves since readings tell it no better: one
     /// standard deviation; empty where it counts as known.
     by_start: Vec<f64>,
-    tolerance: f64,
+    /// Relative error of the nominal coefficients below which nothing is called wrong.
+    pub tolerance: f64,
     /// Tolerance of the integration, see [`integrator::advance`].
     pub integration: f64,
 }
@@ -89,6 +90,24 @@ impl Scope {
     /// The samples that are not among these; for all of them the ones that no fit saw.
     pub fn others(self) -> Self {
         if self == Self::HeldOut { Self::Training } else { Self::HeldOut }
+    }
+}
+
+/// A part of a recording that fits do not see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOut {
+    /// Name of the recording.
+    pub recording: String,
+    /// Time in s from which on they do not.
+    pub from: f64,
+    /// Whether that is where it starts.
+    pub is_whole: bool,
+}
+
+impl std::fmt::Display for HeldOut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { recording, from, is_whole } = self;
+        if *is_whole { write!(f, "{recording}") } else { write!(f, "{recording} from {from:.1} s") }
     }
 }
 
@@ -212,12 +231,13 @@ impl<'a> Data<'a> {
     }
 
     /// What is held out, in words.
-    pub fn held_out(&self) -> String {
+    pub fn held_out(&self) -> Vec<HeldOut> {
         let parts = self.recordings.iter().zip(&self.held_out_from).filter(|(r, from)| r.time.last() > Some(from));
-        let words = parts.map(|(recording, from)| {
-            if *from <= recording.time[0] { recording.name() } else { format!("{} from {from:.1} s", recording.name()) }
-        });
-        words.collect::<Vec<_>>().join(", ")
+        let part = |(recording, from): (&Recording, &f64)| {
+            let start = recording.time[0];
+            HeldOut { recording: recording.name(), from: from.max(start), is_whole: *from <= start }
+        };
+        parts.map(part).collect()
     }
 
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be

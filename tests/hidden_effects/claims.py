@@ -29,6 +29,8 @@ def contradictions(title, score):
     for name, claimed in CLAIMED.get(title, {}).items():
         if name in rates:
             hits, count = rates[name].hits, rates[name].count
+            if binom.cdf(0, count, claimed) >= IMPROBABLE:
+                found.append(f"{title}, {name}: {count} cases are too few to contradict {claimed:.0%}")
             chance = binom.cdf(hits, count, claimed)
             if chance < IMPROBABLE:
                 found.append(f"{title}, {name}: {hits} of {count}; {claimed:.0%} is claimed (chance {chance:.1g})")

@@ -32,6 +32,8 @@ pub struct Task {
     pub rivals: Vec<Rival>,
     /// Sensors with their noise (standard deviation, SI).
     pub sensors: Vec<(Signal, f64)>,
+    /// Relative error of the nominal coefficients that was no cause; `None` where no diagnosis says so.
+    pub tolerance: Option<f64>,
 }
 
 /// Noise of a usual sensor (standard deviation, SI): 5 mbar, 0.1 mm, 1 N.
@@ -99,7 +101,12 @@ impl Task {
         }
         let why = if names.is_empty() { "any cause, at its usual size".to_owned() } else { names.join(", ") };
         let sensors = sensors.iter().map(|signal| (*signal, usual_noise(*signal))).collect();
-        Ok(Self { why, rivals: chosen.into_iter().map(|effect| Rival::usual(effect, nominal)).collect(), sensors })
+        Ok(Self {
+            why,
+            rivals: chosen.into_iter().map(|effect| Rival::usual(effect, nominal)).collect(),
+            sensors,
+            tolerance: None,
+        })
     }
 
     /// What a diagnosis left standing; `None` where it found nothing wrong.
@@ -138,7 +145,7 @@ impl Task {
         if rivals.len() < 2 {
             return Err(not_one("it holds no fits of other effects: run `sinew diagnose` again"));
         }
-        Ok(Some(Self { why, rivals, sensors }))
+        Ok(Some(Self { why, rivals, sensors, tolerance: json["tolerance"].as_f64() }))
     }
 }
 

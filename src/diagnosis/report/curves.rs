@@ -58,20 +58,6 @@ pub fn noise(diagnosis: &Diagnosis, signal: Signal) -> Option<f64> {
     diagnosis.signals.iter().find(|errors| errors.signal == signal).map(|errors| errors.noise_rms)
 }
 
-/// Time in s from which a recording was held out, read from the words of the diagnosis: `run1.csv, run2.csv from 40.0 s`.
-pub fn held_out_from(words: &str, recording: &Recording) -> Option<f64> {
-    let name = recording.name();
-    let named = words.match_indices(&name).filter(|(at, _)| *at == 0 || words[..*at].ends_with(", "));
-    let starts = named.filter_map(|(at, _)| {
-        let rest = &words[at + name.len()..];
-        if rest.is_empty() || rest.starts_with(", ") {
-            return Some(recording.time[0]);
-        }
-        rest.strip_prefix(" from ")?.split(' ').next()?.parse().ok()
-    });
-    starts.reduce(f64::min)
-}
-
 /// Positions of at most about `most` samples that keep the look of all curves: of each stretch of time the lowest and
 /// the highest of each curve, and a missing one where there is a gap.
 fn telling(curves: &[&[f64]], most: usize) -> Vec<usize> {
@@ -134,17 +120,5 @@ mod tests {
     fn numbers_are_short() {
         let values = [1.0, 0.123_456, -2.5, f64::NAN, f64::INFINITY];
         assert_eq!(serde_json::to_string(&rounded(values.into_iter(), 0.01)).unwrap(), "[1,0.12,-2.5,null,null]");
-    }
-
-    #[test]
-    fn held_out_part_is_found_whatever_the_name() {
-        let rows: String = (0..20).map(|k| format!("{k},1,2,3\n")).collect();
-        let text = format!("time [s],command [V],contraction [mm],force [N]\n{rows}");
-        let called = |name: &str| Recording::parse(text.as_bytes(), Path::new(name), &[]).unwrap();
-        let words = "a, b.csv, c from 2.0 s.csv from 12.5 s";
-        assert_eq!(held_out_from(words, &called("a, b.csv")), Some(0.0));
-        assert_eq!(held_out_from(words, &called("c from 2.0 s.csv")), Some(12.5));
-        assert_eq!(held_out_from(words, &called("s.csv")), None);
-        assert_eq!(held_out_from("s.csv from 3.0 s", &called("s.csv")), Some(3.0));
     }
 }

@@ -1,6 +1,6 @@
 //! The diagnosis for machines.
 
-use super::separating_experiment;
+use super::{held_out, separating_experiment};
 use crate::diagnosis::{Diagnosis, FittedParameter};
 use serde_json::{Map, Value, json};
 
@@ -51,10 +51,11 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         .collect();
     json!({
         "verdict": diagnosis.verdict,
+        "tolerance": diagnosis.tolerance,
         "causes": causes,
         "signals": signals,
         "improvement": diagnosis.improvement,
-        "held_out": diagnosis.held_out,
+        "held_out": held_out(diagnosis),
         "separating_experiment": separating_experiment(diagnosis),
         "corrections": parameters(&diagnosis.corrections),
         "correction": diagnosis.correction.as_ref().map(|correction| json!({

@@ -1,4 +1,4 @@
-//! The diagnosis as files: `diagnosis.json`, `report.html`, `extended.toml`, `simulated.csv` and the extended FMU.
+//! The diagnosis as files: `diagnosis.json`, `report.html`, `extended.toml`, `nominal.toml`, `simulated.csv` and the extended FMU.
 
 mod curves;
 mod exposure;
@@ -56,8 +56,13 @@ pub fn gain(diagnosis: &Diagnosis) -> String {
     } else {
         "The extended model removes"
     };
-    let (share, where_from) = (100.0 * diagnosis.improvement, &diagnosis.held_out);
+    let (share, where_from) = (100.0 * diagnosis.improvement, held_out(diagnosis));
     format!("{what} {share:.0} % of the error, on samples {}: {where_from}.", which_samples(diagnosis))
+}
+
+/// Where the samples are that no fit saw.
+fn held_out(diagnosis: &Diagnosis) -> String {
+    diagnosis.held_out.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// On what samples errors are given.
@@ -109,6 +114,7 @@ pub fn files(
             "parameters of the extended model, to edit and to export from",
             extended.to_toml().into(),
         ),
+        made("nominal.toml", "parameters of the model that was diagnosed, for `sinew plan`", nominal.to_toml().into()),
         made(
             "simulated.csv",
             "measured, nominal and extended signals, SI units",

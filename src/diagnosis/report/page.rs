@@ -1,6 +1,6 @@
 //! `report.html`: one file that opens offline, for a person.
 
-use super::curves::{compared, held_out_from, most_samples, over_time};
+use super::curves::{compared, most_samples, over_time};
 use super::exposure::{Exposed, Residuals, SEEN};
 use super::{Made, display_unit, gain, headline, pictures, which_samples};
 use crate::Result;
@@ -27,7 +27,8 @@ pub fn html(diagnosis: &Diagnosis, nominal: &Parameters, recordings: &[Recording
     for (index, recording) in recordings.iter().enumerate() {
         let replays = [replay(nominal, recording)?, replay(&diagnosis.extended, recording)?];
         let signals = compared(recording, &replays[0]);
-        let held_out = held_out_from(&diagnosis.held_out, recording).filter(|_| !diagnosis.saw_all);
+        let own = diagnosis.held_out.iter().find(|part| part.recording == recording.name());
+        let held_out = own.map(|part| part.from).filter(|_| !diagnosis.saw_all);
         curves.push(json!({
             "held_out_from": held_out,
             "signals": signals.iter().map(|s| over_time(diagnosis, recording, *s, &replays, most)).collect::<Vec<_>>(),
@@ -246,7 +247,7 @@ fn next_measurements(diagnosis: &Diagnosis, recordings: &[Recording]) -> Vec<Str
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::Remaining;
+    use crate::diagnosis::{HeldOut, Remaining};
 
     #[test]
     fn nothing_in_the_data_ends_the_script() {
@@ -262,10 +263,11 @@ mod tests {
         Diagnosis {
             correction: None,
             verdict,
+            tolerance: 0.03,
             causes,
             signals: vec![SignalErrors { signal: Signal::Force, nominal_rms: 20.0, extended_rms: 2.0, noise_rms: 1.0 }],
             improvement: 0.9,
-            held_out: "<i>.csv from 6.0 s".to_owned(),
+            held_out: vec![HeldOut { recording: "<i>.csv".to_owned(), from: 6.0, is_whole: false }],
             saw_all: false,
             ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2, parameters: Vec::new() }],
             extended: Parameters::default(),
