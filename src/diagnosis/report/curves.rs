@@ -102,7 +102,6 @@ pub fn span(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn thinning_keeps_peaks_and_gaps() {
