@@ -125,7 +125,7 @@ enum Command {
         /// Relative error of the nominal coefficients below which nothing is called wrong
         #[arg(long, default_value_t = diagnosis::DEFAULT_TOLERANCE, value_parser = tolerance)]
         tolerance: f64,
-        /// Folder for diagnosis.json, report.html, extended.toml, simulated.csv and the extended FMU
+        /// Folder for diagnosis.json, report.html, extended.toml, nominal.toml, simulated.csv and the extended FMU
         #[arg(long, default_value = "sinew-diagnosis")]
         out: PathBuf,
     },
