@@ -4,7 +4,7 @@
 use super::evidence::*;
 use super::{Chosen, Judged, LEAST_EVIDENCE, Search, effects_of, is_possible, same_effects};
 use crate::diagnosis::fits::Fitted;
-use crate::diagnosis::hypothesis::declared;
+use crate::diagnosis::hypothesis::{Part, declared};
 use crate::diagnosis::residuals::Scope;
 use crate::diagnosis::{FittedParameter, Verdict};
 use crate::effects::Holds;
@@ -49,7 +49,7 @@ impl Search<'_, '_> {
             None if self.is_sound(&self.baseline.losses) => refused(Verdict::Nominal, &self.baseline),
             None => refused(Verdict::Unexplained, &self.baseline),
         };
-        let Some(best) = self.leading(levels).map(|best| self.pruned(best.clone())) else {
+        let Some(best) = self.leading(levels).map(|best| self.assured(self.pruned(best.clone()))) else {
             return else_there(self.unlisted.as_ref());
         };
         let instead = self.unlisted_instead_of(&best);
@@ -97,6 +97,35 @@ impl Search<'_, '_> {
             Some(fewer) if !self.is_worth(&fewer, &judged) => self.pruned(fewer),
             _ => judged,
         }
+    }
+
+    /// Drops effects of several that may as well be neutral, in their plain form, too: what the odds make of them hangs on a few blocks, and is
+    /// more likely the form of the others.
+    fn assured(&self, judged: Judged) -> Judged {
+        let Fitted { hypothesis, .. } = &judged.fitted;
+        if hypothesis.parts.len() < 2 {
+            return judged;
+        }
+        let in_doubt = hypothesis.parts.iter().find(|part| {
+            let is_wanted = |name: &str| part.refinements().all(|(own, _)| *own != name);
+            self.may_be_neutral(&judged.fitted, part)
+                && self
+                    .bench
+                    .less_refined(&judged.fitted, is_wanted)
+                    .is_some_and(|plain| self.may_be_neutral(&plain, part))
+        });
+        match in_doubt.and_then(|part| self.without(&judged, part)).filter(is_possible) {
+            Some(fewer) => self.assured(fewer),
+            None => judged,
+        }
+    }
+
+    /// Whether the intervals of all parameters of an effect hold their neutral values.
+    fn may_be_neutral(&self, fitted: &Fitted, part: &Part) -> bool {
+        let neutral = Parameters::default();
+        let (own, _) = self.bench.intervals(fitted, Scope::All);
+        let mut own = own.iter().filter(|own| part.freed().any(|(name, _)| *name == own.name));
+        own.all(|own| (own.low..=own.high).contains(&declared(&neutral, own.name).1))
     }
 
     /// The hypothesis without refinements, where that leaves nothing either and its causes can be so: they were for the comparison with its rivals.
