@@ -152,7 +152,7 @@ pub struct Diagnosis {
 /// found where these are [`numbered`](crate::measurement::numbered).
 ///
 /// # Errors
-/// [`Error::Recording`] where nothing can be compared; errors of the simulation of the nominal model.
+/// [`Error::Recording`](crate::Error::Recording) where nothing can be compared; errors of the simulation of the nominal model.
 pub fn diagnose(
     nominal: &Parameters,
     recordings: &[Recording],
