@@ -408,18 +408,19 @@ fn understand(
         Some((name, rest)) => (name.trim(), Some(rest.trim_end().trim_end_matches(']').trim())),
         None => (ours.trim(), None),
     };
+    let fail = |problem| Error::Csv { path: path.to_owned(), line: 1, column: Some(header.to_owned()), problem };
     let Some((_, signal, units)) = COLUMNS.iter().find(|(known, ..)| *known == name) else {
         if ours != header {
             let known: Vec<&str> = COLUMNS.iter().map(|(known, ..)| *known).collect();
-            let problem =
-                format!("--map gives it the name `{name}`, which no column has; use one of {}", known.join(", "));
-            return Err(Error::Csv { path: path.to_owned(), line: 1, column: Some(header.to_owned()), problem });
+            return Err(fail(format!(
+                "--map gives it the name `{name}`, which no column has; use one of {}",
+                known.join(", ")
+            )));
         }
         notes.push(format!("column `{header}` is not used"));
         return Ok(None);
     };
     let known = units.iter().map(|(symbol, _)| *symbol).collect::<Vec<_>>().join(", ");
-    let fail = |problem| Error::Csv { path: path.to_owned(), line: 1, column: Some(header.to_owned()), problem };
     let unit = unit.ok_or_else(|| fail(format!("the header has no unit: write `{name} [{}]`", units[0].0)))?;
     let found = units.iter().find(|(symbol, _)| *symbol == unit);
     let (unit, scale) = *found.ok_or_else(|| fail(format!("unit `{unit}` is unknown: use one of {known}")))?;

@@ -309,6 +309,14 @@ pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) 
     (target + parameters.effects.rests_off()).max(0.0)
 }
 
+/// State of a muscle with a hanging load at a point, its effects as at the start.
+fn hanging_state(parameters: &Parameters, at: &Point) -> Extended<3, HANGING_STATES> {
+    let mut state = [0.0; HANGING_STATES];
+    state[..3].copy_from_slice(&[at.gauge_pressure, at.contraction, at.contraction_velocity]);
+    state[3..].copy_from_slice(&effects_at_start(parameters, at));
+    Extended(state)
+}
+
 /// Rates of gauge pressure in Pa, contraction in m and its velocity in m/s of a load that hangs, in SI units per second, under a command in V;
 /// with the effects as they are where that rests.
 pub fn quasi_steady_rates(
@@ -317,11 +325,8 @@ pub fn quasi_steady_rates(
     command: f64,
 ) -> [f64; 3] {
     let still = Parameters { effects: parameters.effects.at_rest(), ..*parameters };
-    let own = effects_at_start(&still, &moved(pressure, contraction, velocity));
-    let at_rest = Extended([0.0; 3 + Effects::STATES]);
-    let (mut state, mut rates) = (at_rest, at_rest);
-    state.0[..3].copy_from_slice(&[pressure, contraction, velocity]);
-    state.0[3..].copy_from_slice(&own);
+    let state = hanging_state(&still, &moved(pressure, contraction, velocity));
+    let mut rates = state;
     PneumaticMuscle::rates(&still, &MuscleInputs { command, external_force: 0.0 }, &state, &mut rates);
     [rates.0[0], rates.0[1], rates.0[2]]
 }
@@ -402,11 +407,7 @@ impl System for PneumaticMuscle {
         let ((mass, _), gauge_pressure) = (masses(parameters), parameters.initial.gauge_pressure);
         let hanging = equilibrium(parameters, gauge_pressure, mass * GRAVITY + inputs.external_force);
         let contraction = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
-        let mut state = [0.0; HANGING_STATES];
-        let at = at_start(parameters, gauge_pressure, contraction);
-        state[..3].copy_from_slice(&[at.gauge_pressure, at.contraction, at.contraction_velocity]);
-        state[3..].copy_from_slice(&effects_at_start(parameters, &at));
-        Ok(Extended(state))
+        Ok(hanging_state(parameters, &at_start(parameters, gauge_pressure, contraction)))
     }
 
     #[inline]

@@ -230,7 +230,7 @@ impl<'a> Data<'a> {
         }
     }
 
-    /// What is held out, in words.
+    /// The parts of recordings that are held out.
     pub fn held_out(&self) -> Vec<HeldOut> {
         let parts = self.recordings.iter().zip(&self.held_out_from).filter(|(r, from)| r.time.last() > Some(from));
         let part = |(recording, from): (&Recording, &f64)| {

@@ -122,10 +122,8 @@ impl Search<'_, '_> {
 
     /// Whether the intervals of all parameters of an effect hold their neutral values.
     fn may_be_neutral(&self, fitted: &Fitted, part: &Part) -> bool {
-        let neutral = Parameters::default();
         let (own, _) = self.bench.intervals(fitted, Scope::All);
-        let mut own = own.iter().filter(|own| part.freed().any(|(name, _)| *name == own.name));
-        own.all(|own| (own.low..=own.high).contains(&declared(&neutral, own.name).1))
+        own.iter().filter(|own| part.freed().any(|(name, _)| *name == own.name)).all(holds_neutral)
     }
 
     /// The hypothesis without refinements, where that leaves nothing either and its causes can be so: they were for the comparison with its rivals.
@@ -143,14 +141,12 @@ impl Search<'_, '_> {
         if !judged.fitted.hypothesis.is_refined() {
             return judged;
         }
-        let neutral = Parameters::default();
         let (own, _) = self.bench.intervals(&judged.fitted, Scope::All);
-        let neutral = |own: &FittedParameter| declared(&neutral, own.name).1;
         let parts = &judged.fitted.hypothesis.parts;
         let is_refinement =
             |own: &&FittedParameter| parts.iter().any(|part| part.refinements().any(|(name, _)| *name == own.name));
-        let may_be_neutral = |own: &&FittedParameter| (own.low..=own.high).contains(&neutral(own));
-        let mut idle: Vec<&FittedParameter> = own.iter().filter(is_refinement).filter(may_be_neutral).collect();
+        let mut idle: Vec<&FittedParameter> =
+            own.iter().filter(is_refinement).filter(|own| holds_neutral(own)).collect();
         // In its interval, the ones that are nearest to neutral first.
         let doubt =
             |own: &FittedParameter| (own.value - neutral(own)).abs() / (own.high - own.low).max(f64::MIN_POSITIVE);
@@ -250,6 +246,16 @@ fn least_explained(fitted: &Fitted) -> (f64, f64) {
 fn is_better_if_impossible(levels: &[Vec<Judged>], best: &Judged) -> bool {
     let mut same = levels.iter().flatten().filter(|other| same_effects(other, best) && !is_possible(other));
     same.any(|other| evidence(&best.fitted, &other.fitted) > LEAST_EVIDENCE)
+}
+
+/// Value at which a parameter does nothing.
+fn neutral(own: &FittedParameter) -> f64 {
+    declared(&Parameters::default(), own.name).1
+}
+
+/// Whether a parameter's interval holds that.
+fn holds_neutral(own: &FittedParameter) -> bool {
+    (own.low..=own.high).contains(&neutral(own))
 }
 
 /// Effects that stand in the place of one in rivals that agree in all others.
