@@ -1,4 +1,4 @@
-use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, of_recording, scaled, told_anew};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, by_curvature, of_recording, scaled, told_anew};
 
 /// Relative error below which nothing would be left of the muscle.
 const LEAST: f64 = -0.9;
@@ -7,8 +7,8 @@ crate::variables::variables! {
     /// A muscle that is stronger or weaker as a whole.
     ///
     /// # Model
-    /// F_static ← F_static (1 + g + b (F_static/400 N − 1)): `relative_error` g, `bend` b where it changes with the force. Of the
-    /// elastic force 1 + m g counts in place of 1 + g: `elastic_share` m. By `second` and `third` g is more in these recordings.
+    /// F_static ← F_static (1 + g + b (r − 1) + c (r² − 1)), r = F_static/400 N: `relative_error` g, `bend` b and `curvature` c where it
+    /// changes with the force. Of the elastic force 1 + m g counts in place of 1 + g: `elastic_share` m. By `second` and `third` g is more in these recordings.
     ///
     /// # In the data
     /// The force residual is in proportion to the force, whatever pressure and contraction; the motion goes with it,
@@ -25,6 +25,8 @@ crate::variables::variables! {
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Change of the gain per 400 N away from 400 N: threads that stretch
         bend: f64 = 0.0, ONE, (-0.05..=0.05);
+        /// Change of the gain with the square of the force, per that of 400 N
+        curvature: f64 = 0.0, ONE, (-0.03..=0.03);
         /// By how much more in the second of several recordings: it ages from one to the next
         second: f64 = 0.0, ONE, (-0.5..=0.5);
         /// By how much more in the third
@@ -47,7 +49,7 @@ impl Effect for ForceGain {
     const DESCRIPTION: Description = Description {
         name: "force_gain",
         meaning: "the whole force is scaled: wrong bore, ageing",
-        equation: "F_static <- F_static (1 + g + b (F_static/400 N - 1)), of the elastic force 1 + m g for 1 + g",
+        equation: "F_static <- F_static (1 + g + b (r - 1) + c (r^2 - 1)), r = F_static/400 N, of the elastic force 1 + m g for 1 + g",
         signature: "force residual in proportion to the force, and the motion with it",
         experiment: "two known masses, static and dynamic",
         reference: "definition",
@@ -62,12 +64,16 @@ impl Effect for ForceGain {
                 ("force_gain.third", &[-0.06]),
             ],
         ],
-        refinements: &[("force_gain.bend", &[0.005]), ("force_gain.elastic_share", &[0.5])],
+        refinements: &[
+            ("force_gain.bend", &[0.005]),
+            ("force_gain.curvature", &[0.002]),
+            ("force_gain.elastic_share", &[0.5]),
+        ],
     };
-    const ENDS_INSIDE: &'static [&'static str] = &["force_gain.bend"];
+    const ENDS_INSIDE: &'static [&'static str] = &["force_gain.bend", "force_gain.curvature"];
 
     fn is_neutral(&self) -> bool {
-        [self.relative_error, self.second, self.third, self.bend] == [0.0; 4]
+        [self.relative_error, self.second, self.third, self.bend, self.curvature] == [0.0; 5]
     }
 
     fn elastic_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
@@ -80,7 +86,7 @@ impl Effect for ForceGain {
     }
 
     fn static_force(&self, force: f64) -> f64 {
-        scaled(force, self.error(), self.bend, REFERENCE_FORCE)
+        scaled(force, self.error() + by_curvature(force, self.curvature, REFERENCE_FORCE), self.bend, REFERENCE_FORCE)
     }
 
     fn sentence(&self) -> String {

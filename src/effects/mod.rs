@@ -57,6 +57,11 @@ fn scaled(value: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
     value * (1.0 + relative_error + bend * (value / middle - 1.0))
 }
 
+/// What the curvature of a scale adds to its relative error: nothing at the middle of the scale, three times the curvature at twice that.
+fn by_curvature(value: f64, curvature: f64, middle: f64) -> f64 {
+    curvature * ((value / middle).powi(2) - 1.0)
+}
+
 /// The value that [`scaled`] made a reading of: the root of a quadratic that is near to the reading.
 fn unscaled(reading: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
     let slope = 1.0 + relative_error - bend;
