@@ -37,7 +37,7 @@ use selection::{Chosen, Judged, MOST_EFFECTS};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use unlisted::Shown;
-use ways::{Found, Way};
+use ways::Way;
 
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
@@ -172,12 +172,12 @@ pub fn diagnose(
         for_fits.doubt_starts(nominal);
         Way::new(Bench::new(for_fits, nominal, tolerance, *off), *off == Off::most(nominal)).ok_or_else(cannot_follow)
     };
-    let Found { bench, chosen } = match Off::ways(nominal) {
+    let found = match Off::ways(nominal) {
         [narrow, wide] => ways::better(prepared(narrow)?, || prepared(wide), done)?,
         ways => prepared(&ways[0])?.searched(MOST_EFFECTS, done),
     }
     .ok_or_else(cannot_follow)?;
-    answer(&bench, data, nominal, &chosen, notes).ok_or_else(cannot_follow)
+    answer(found.bench(), data, nominal, &found.chosen, notes).ok_or_else(cannot_follow)
 }
 
 /// The recordings with as many samples as fits need.

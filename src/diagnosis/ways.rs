@@ -8,6 +8,9 @@ use super::selection::evidence::{is_unsound, odds};
 use super::selection::{Chosen, LEAST_EVIDENCE, MOST_EFFECTS, Search};
 use crate::Result;
 
+/// Effects that are looked for in both ways before more are in either.
+const AT_FIRST: usize = 2;
+
 /// A way in which the coefficients of the nominal model may be off, before any effect is looked for.
 pub struct Way<'a> {
     bench: Bench<'a>,
@@ -32,10 +35,11 @@ impl<'a> Way<'a> {
     }
 
     /// Looks for at most so many effects; `done` is told after the nominal model and each candidate. `None` where a model cannot be simulated.
-    pub fn searched(mut self, most: usize, done: &(dyn Fn(&str) + Sync)) -> Option<Found<'a>> {
+    pub fn searched(self, most: usize, done: &(dyn Fn(&str) + Sync)) -> Option<Found<'a>> {
         done("nominal");
-        let chosen = Search::new(&mut self.bench, self.baseline, most, self.allows_most).run(done)?;
-        Some(Found { bench: self.bench, chosen })
+        let mut search = Search::new(self.bench, self.baseline, self.allows_most, done);
+        let chosen = search.up_to(most)?;
+        Some(Found { search, chosen })
     }
 }
 
@@ -52,27 +56,51 @@ pub fn better<'a>(
     let at_once = if narrow.says_all() { None } else { Some(wide()?) };
     // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
     let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
-    let Some(found) = narrow.searched(most, done) else { return Ok(None) };
+    let Some(mut found) = narrow.searched(most.min(AT_FIRST), done) else { return Ok(None) };
     if found.finds_nothing() {
         return Ok(Some(found));
     }
     let wide = at_once.map_or_else(wide, Ok)?;
-    let next = wide.searched(found.most_beside(), done);
-    Ok(next.map(|next| if found.beats(&next) { found } else { next }))
+    let Some(mut other) = wide.searched(found.most_beside().min(AT_FIRST), done) else { return Ok(None) };
+    // A third one takes minutes to find, and none is missing where two say all.
+    if !other.says_all() {
+        found.up_to(most);
+        other.up_to(found.most_beside());
+    }
+    Ok(Some(if found.beats(&other) { found } else { other }))
 }
 
 /// What was found where the coefficients of the nominal model may be off in one way.
 pub struct Found<'a> {
-    /// The hypotheses' fits.
-    pub bench: Bench<'a>,
-    /// What came of them.
+    /// Where it was looked for.
+    pub search: Search<'a>,
+    /// What came of it.
     pub chosen: Chosen,
 }
 
-impl Found<'_> {
+impl<'a> Found<'a> {
+    /// The hypotheses' fits.
+    pub fn bench(&self) -> &Bench<'a> {
+        &self.search.bench
+    }
+
+    /// Looks for more effects, at most so many, where that is worth it.
+    fn up_to(&mut self, most: usize) {
+        if self.search.goes_on(most)
+            && let Some(chosen) = self.search.up_to(most)
+        {
+            self.chosen = chosen;
+        }
+    }
+
+    /// Whether no more is left than a sound model may leave and, of several causes, their forms.
+    fn says_all(&self) -> bool {
+        self.chosen.says_all(&self.bench().data)
+    }
+
     /// Whether nothing is wrong, so that nothing can be where the coefficients may be off in a way that allows more.
     pub fn finds_nothing(&self) -> bool {
-        self.causes() == 0 && self.chosen.says_all(&self.bench.data)
+        self.causes() == 0 && self.says_all()
     }
 
     /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
@@ -80,7 +108,7 @@ impl Found<'_> {
     pub fn most_beside(&self) -> usize {
         match self.causes() {
             0 => MOST_EFFECTS,
-            _ if !self.chosen.says_all(&self.bench.data) => MOST_EFFECTS,
+            _ if !self.says_all() => MOST_EFFECTS,
             causes => (causes - 1).max(1),
         }
     }
@@ -91,8 +119,8 @@ impl Found<'_> {
     pub fn beats(&self, other: &Self) -> bool {
         let more = self.causes() as f64 - other.causes() as f64;
         let (may_be, stranger) = match other.causes() {
-            0 if self.is_unlisted() && other.chosen.says_all(&other.bench.data) => (false, 0.0),
-            0 => (self.chosen.shows_beside_coefficients(&self.bench.data), 0.0),
+            0 if self.is_unlisted() && other.says_all() => (false, 0.0),
+            0 => (self.chosen.shows_beside_coefficients(&self.bench().data), 0.0),
             _ => (true, f64::from(self.is_unlisted()) - f64::from(other.is_unlisted())),
         };
         self.causes() > 0 && may_be && self.odds_against(other) > LEAST_EVIDENCE * (more + stranger)
@@ -128,19 +156,19 @@ impl Found<'_> {
         let hypothesis = shared.parts.iter().fold(own.hypothesis.clone(), |all, part| all.in_form_of(*part));
         let without = shared.parts.iter().fold(own.parameters, |model, part| neutralised(&model, part.effect));
         let start = shared.at_work_in(&without, &others.parameters);
-        self.bench.exact_fit(&hypothesis, &start, Scope::All).filter(Fitted::is_possible)
+        self.bench().exact_fit(&hypothesis, &start, Scope::All).filter(Fitted::is_possible)
     }
 
     /// The odds against one fit of the other way; the likelihoods are those of the other one's data.
     fn odds_against_fit(&self, other: &Self, others: &Fitted) -> f64 {
         let own = &self.chosen.best;
-        let losses = |fitted: &Fitted| other.bench.data.losses(&fitted.residuals, Scope::All);
+        let losses = |fitted: &Fitted| other.bench().data.losses(&fitted.residuals, Scope::All);
         let (mut with, without) = (losses(own), losses(others));
         // The whiter residuals say how much a sample is worth, but no shape of a sound muscle is worth more than once in a block.
         for (a, b) in with.iter_mut().zip(&without) {
             a.effective = a.effective.max(b.effective).min(a.effective_beside_structure);
         }
         let more = own.hypothesis.size() as f64 - others.hypothesis.size() as f64;
-        odds(&without, &with, more) - self.bench.price(own) + other.bench.price(others)
+        odds(&without, &with, more) - self.bench().price(own) + other.bench().price(others)
     }
 }

@@ -18,7 +18,7 @@ const MAY_BE_RIVALS: usize = 5;
 /// five sixths.
 const OUT_OF_REACH: f64 = 10.0;
 
-impl Search<'_, '_> {
+impl Search<'_> {
     /// Hypotheses refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
     /// best and the best that is possible with all of their effects, those that are carried on or may rival it with their last. Where the best leaves no more
     /// than forms may, only its possible rivals are, with all of theirs; other forms are worth the time to single effects, also where the

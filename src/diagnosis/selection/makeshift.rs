@@ -7,7 +7,7 @@ use crate::diagnosis::selection::naming::LEAST_EXPLAINED;
 use crate::diagnosis::unlisted::{Shown, Unlisted};
 use rayon::prelude::*;
 
-impl Search<'_, '_> {
+impl Search<'_> {
     /// The best of them that is worth a word: it shows, and has the odds and the share of the error, seen and unseen, that an effect needs
     /// to be named.
     pub(super) fn best_unlisted(&self) -> Option<Judged> {
@@ -51,9 +51,9 @@ impl Search<'_, '_> {
     }
 
     /// Whether such a cause leaves no more than a sound model may, where nothing does that has fewer causes than are looked for next.
-    pub(super) fn unlisted_says_all(&self, levels: &[Vec<Judged>]) -> bool {
+    pub(super) fn unlisted_says_all(&self) -> bool {
         let says_all = |unlisted: &Judged| !is_unsound(&unlisted.fitted.losses, &self.bench.data);
-        let instead = match self.leading(levels) {
+        let instead = match self.leading() {
             Some(best) => self.unlisted_instead_of(best),
             None => self.unlisted.as_ref(),
         };

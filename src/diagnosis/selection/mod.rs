@@ -101,22 +101,36 @@ impl Chosen {
 }
 
 /// The search for the causes of what a baseline leaves.
-pub struct Search<'a, 'b> {
-    bench: &'b mut Bench<'a>,
+pub struct Search<'a> {
+    /// The hypotheses' fits.
+    pub bench: Bench<'a>,
     baseline: Fitted,
-    /// Most effects that are looked for at once.
-    most: usize,
     /// Whether what the form of one cause may leave is worth a second one.
     minds_form: bool,
+    /// Hypotheses of one effect, of two, and so on, the best of each first.
+    levels: Vec<Vec<Judged>>,
+    /// From where each effect alone is best fitted.
+    from: Vec<(Part, usize)>,
     /// The best cause that is in no library.
     unlisted: Option<Judged>,
 }
 
-impl<'a, 'b> Search<'a, 'b> {
-    /// A search from a baseline for at most so many effects. Where another search lets the coefficients be off in a way that allows more, what
-    /// the form of a cause may leave is that one's to explain: else coefficients that are off come out as a second cause.
-    pub fn new(bench: &'b mut Bench<'a>, baseline: Fitted, most: usize, minds_form: bool) -> Self {
-        Self { bench, baseline, most, minds_form, unlisted: None }
+impl<'a> Search<'a> {
+    /// A search from a baseline, with single effects fitted; `done` is told after each candidate. Where another search lets the coefficients be
+    /// off in a way that allows more, what the form of a cause may leave is that one's to explain: else coefficients that are off come out as
+    /// a second cause.
+    pub fn new(bench: Bench<'a>, baseline: Fitted, minds_form: bool, done: &(dyn Fn(&str) + Sync)) -> Self {
+        let mut search = Self { bench, baseline, minds_form, levels: Vec::new(), from: Vec::new(), unlisted: None };
+        let starts = search.starts(done);
+        search.from = best_of_each(&starts);
+        let mut singles = search.fitted(&search.baseline, starts, FITTED.0);
+        if singles.first().is_some_and(|best| best.evidence > LEAST_EVIDENCE) {
+            singles = search.judged_anew(singles);
+        }
+        let singles = if search.may_show() { search.refined_best(singles) } else { singles };
+        search.unlisted = if search.is_sound(&search.baseline.losses) { None } else { search.best_unlisted() };
+        search.levels = vec![singles];
+        search
     }
 
     fn judge(&self, fitted: Fitted) -> Judged {
@@ -127,31 +141,24 @@ impl<'a, 'b> Search<'a, 'b> {
         Judged { fitted, evidence, score, explained }
     }
 
-    /// Finds the causes; `done` is told after each candidate.
-    pub fn run(mut self, done: &(dyn Fn(&str) + Sync)) -> Option<Chosen> {
-        let starts = self.starts(done);
-        let from = best_of_each(&starts);
-        let mut singles = self.fitted(&self.baseline, starts, FITTED.0);
-        if singles.first().is_some_and(|best| best.evidence > LEAST_EVIDENCE) {
-            singles = self.judged_anew(singles);
-        }
-        let singles = if self.may_show() { self.refined_best(singles) } else { singles };
-        self.unlisted = if self.is_sound(&self.baseline.losses) { None } else { self.best_unlisted() };
-        self.go_on(vec![singles.clone()], singles, &from)
-    }
-
-    /// Adds levels of one effect more each while that is worth it, and chooses.
-    fn go_on(&self, mut levels: Vec<Vec<Judged>>, singles: Vec<Judged>, from: &[(Part, usize)]) -> Option<Chosen> {
-        while self.is_worth_going_on(&levels) {
-            let next = self.next_level(levels.last()?, from);
-            levels.push(next);
+    /// Looks for at most so many effects at once, as long as one more is worth it, and chooses.
+    pub fn up_to(&mut self, most: usize) -> Option<Chosen> {
+        while self.goes_on(most) {
+            let next = self.next_level(self.levels.last()?);
+            self.levels.push(next);
             // What is not told has no rivals.
-            if self.leading(&levels).is_some_and(|best| best.fitted.hypothesis.parts.len() == levels.len()) {
-                let next = levels.pop()?;
-                levels.push(self.rivals_in_best_form(next));
+            if self.leading().is_some_and(|best| best.fitted.hypothesis.parts.len() == self.levels.len()) {
+                let next = self.levels.pop()?;
+                let next = self.rivals_in_best_form(next);
+                self.levels.push(next);
             }
         }
-        self.choose(&levels, singles)
+        self.choose()
+    }
+
+    /// Whether at most so many effects at once are more than were looked for, and worth it.
+    pub fn goes_on(&self, most: usize) -> bool {
+        self.levels.len() < most && self.is_worth_going_on()
     }
 
     /// Judges fits again with what the first of them shows of the noise.
@@ -218,17 +225,17 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Whether the last level brought a better hypothesis, and that leaves an error that is worth a further effect; or whether no single
     /// effect has the odds for it, as each of two leaves the other one's error. What the form of one cause may leave is worth a second one;
     /// what the forms of two may leave is not worth a third.
-    fn is_worth_going_on(&self, levels: &[Vec<Judged>]) -> bool {
-        let now = levels.last().map_or(0, |level| effects_of(level));
+    fn is_worth_going_on(&self) -> bool {
+        let now = self.levels.last().map_or(0, |level| effects_of(level));
         let asks_for_more = |best: &Judged| {
             is_unsound(&best.fitted.losses, &self.bench.data)
                 && (now == 1 && self.minds_form || !self.may_be_form(&best.fitted.losses))
         };
-        let is_worth = match self.leading(levels) {
+        let is_worth = match self.leading() {
             Some(best) => best.fitted.hypothesis.parts.len() == now && asks_for_more(best),
             None => now == 1 && !self.is_sound(&self.baseline.losses),
         };
-        now < self.most && is_worth && !self.unlisted_says_all(levels)
+        is_worth && !self.unlisted_says_all()
     }
 
     /// Whether residuals are small enough to be those of forms or of a sound model.
@@ -259,13 +266,13 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The most promising hypotheses with one effect more than those of a level, the best first. Of the best, effects are exchanged for
     /// others until no other one becomes the best by that.
-    fn next_level(&self, level: &[Judged], starts: &[(Part, usize)]) -> Vec<Judged> {
+    fn next_level(&self, level: &[Judged]) -> Vec<Judged> {
         let mut bases = carried_on(level);
         // What forms may leave is looked into only where the best leaves it.
         if level.first().is_some_and(|best| self.may_be_form(&best.fitted.losses)) {
             bases.truncate(1);
         }
-        let more = bases.into_iter().flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, starts)).collect();
+        let more = bases.into_iter().flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, &self.from)).collect();
         let mut next = self.worth_refining(level, more);
         let mut exchanged_in: Vec<Vec<&str>> = Vec::new();
         while let Some(best) = possible(&next).or(next.first()) {
@@ -273,7 +280,7 @@ impl<'a, 'b> Search<'a, 'b> {
             if exchanged_in.contains(&names) {
                 break;
             }
-            let others = self.exchanged(level, &next, best, starts);
+            let others = self.exchanged(level, &next, best);
             next.extend(others);
             next = each_once(next);
             exchanged_in.push(names);
@@ -286,7 +293,7 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Where the best leaves more than forms may, the earlier effects are exchanged, beside what the rest is without them: alone, a wrong one
     /// may have looked better. Where it does not, and is worth one effect more than a level has, all are, beside what the rest is with
     /// them: what does the same there may not have been found from elsewhere.
-    fn exchanged(&self, level: &[Judged], known: &[Judged], best: &Judged, starts: &[(Part, usize)]) -> Vec<Judged> {
+    fn exchanged(&self, level: &[Judged], known: &[Judged], best: &Judged) -> Vec<Judged> {
         let parts = &best.fitted.hypothesis.parts;
         let without: Vec<(&Part, Fitted)> = if !self.may_be_form(&best.fitted.losses) {
             let earlier = parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
@@ -297,7 +304,7 @@ impl<'a, 'b> Search<'a, 'b> {
             Vec::new()
         };
         let exchange = |(part, base): &(&Part, Fitted)| {
-            let others = starts.iter().copied().filter(|(other, _)| other.effect.name != part.effect.name);
+            let others = self.from.iter().copied().filter(|(other, _)| other.effect.name != part.effect.name);
             self.extend(base, false, &others.collect::<Vec<_>>())
         };
         let mut exchanged: Vec<Judged> = without.iter().flat_map(exchange).collect();
@@ -327,11 +334,12 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     /// The best hypothesis of all levels, each of which must be worth its effects; the first may be of two.
-    fn leading<'l>(&self, levels: &'l [Vec<Judged>]) -> Option<&'l Judged> {
+    fn leading(&self) -> Option<&Judged> {
         let leads =
             |best: &&Judged| best.evidence > LEAST_EVIDENCE && self.shows(&self.baseline.losses, &best.fitted.losses);
-        let mut best = possible(&levels[0]).filter(leads);
-        for level in &levels[1..] {
+        let (singles, further) = self.levels.split_first()?;
+        let mut best = possible(singles).filter(leads);
+        for level in further {
             let is_worth = |more: &&Judged| best.map_or_else(|| leads(more), |best| self.is_worth(best, more));
             let Some(more) = possible(level).filter(is_worth) else { break };
             best = Some(more);

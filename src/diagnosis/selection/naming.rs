@@ -28,8 +28,9 @@ const ALSO_BY_FORM: f64 = 3.0;
 /// quantile of χ² with one degree of freedom.
 const SPARED: f64 = 1.92;
 
-impl Search<'_, '_> {
-    pub(super) fn choose(&self, levels: &[Vec<Judged>], singles: Vec<Judged>) -> Option<Chosen> {
+impl Search<'_> {
+    pub(super) fn choose(&self) -> Option<Chosen> {
+        let singles = self.levels.first()?;
         let refused = |verdict, best: &Fitted| {
             let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
             Some(Chosen {
@@ -49,11 +50,11 @@ impl Search<'_, '_> {
             None if self.is_sound(&self.baseline.losses) => refused(Verdict::Nominal, &self.baseline),
             None => refused(Verdict::Unexplained, &self.baseline),
         };
-        let Some(best) = self.leading(levels).map(|best| self.assured(self.pruned(best.clone()))) else {
+        let Some(best) = self.leading().map(|best| self.assured(self.pruned(best.clone()))) else {
             return else_there(self.unlisted.as_ref());
         };
         let instead = self.unlisted_instead_of(&best);
-        if best.explained < least_explained(&best.fitted).0 || is_better_if_impossible(levels, &best) {
+        if best.explained < least_explained(&best.fitted).0 || is_better_if_impossible(&self.levels, &best) {
             return else_there(instead);
         }
         let plain = self.simplest(&best);
@@ -66,7 +67,7 @@ impl Search<'_, '_> {
         let are_idle = told.fitted.hypothesis.size() < size;
         let foretold = self.foretelling(told).or_else(|| if are_idle { self.foretelling(plain) } else { None });
         let Some((model, holds_out)) = foretold else { return else_there(instead) };
-        let of_as_many = levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
+        let of_as_many = self.levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
         let rivals = self.rivals(&best, size, of_as_many.map_or(&[], |level| level));
         let alternatives: Vec<Vec<&'static str>> =
             best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
@@ -79,6 +80,7 @@ impl Search<'_, '_> {
         };
         let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
         let (best, without) = (best.fitted, self.baseline.losses.clone());
+        let singles = singles.clone();
         Some(Chosen { verdict, model, best, without, saw_all: !holds_out, alternatives, rivals, singles })
     }
 
