@@ -4,9 +4,9 @@ crate::variables::variables! {
     /// Pressure that is lost before the muscle responds.
     ///
     /// # Model
-    /// The area feels p − l₀ − l exp(−(p/f)ᵉ) (1 − d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
-    /// `decrease_with_contraction` d; `lasting` l₀ does not fade and, with an
-    /// `onset` o, is l₀ (1 − exp(−p/o)).
+    /// The area feels p − (l₀ + l exp(−(p/f)ᵉ)) (1 − d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
+    /// `decrease_with_contraction` d, as a bladder comes to the braid while the muscle grows thick; `lasting` l₀ does not fade with the
+    /// pressure and, with an `onset` o, is l₀ (1 − exp(−p/o)).
     ///
     /// # In the data
     /// The force falls short at low pressure only, by the same in both directions; above a bar or two nothing is wrong.
@@ -26,7 +26,7 @@ crate::variables::variables! {
         /// How suddenly the loss fades: 1 gradually
         exponent: f64 = 1.0, ONE, (0.5..=6.0);
         /// Relative decrease of the loss at 0.1 m of contraction
-        decrease_with_contraction: f64 = 0.0, ONE, (-1.0..=1.0);
+        decrease_with_contraction: f64 = 0.0, ONE, (-1.0..=2.0);
         /// Pressure that is lost at any pressure
         lasting: f64 = 0.0, PASCAL, (0.0..=4e5);
         /// Pressure over which that sets in
@@ -48,7 +48,7 @@ impl Effect for ThresholdPressure {
     const DESCRIPTION: Description = Description {
         name: "threshold_pressure",
         meaning: "pressure lost before the muscle responds, which matters at low pressure",
-        equation: "p <- max(0, p - l0 (1 - exp(-p/o)) - l exp(-(p/f)^e) (1 - d x/0.1 m))",
+        equation: "p <- max(0, p - (l0 (1 - exp(-p/o)) + l exp(-(p/f)^e)) (1 - d x/0.1 m))",
         signature: "force falls short at low pressure only, the same in both directions",
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
@@ -65,6 +65,7 @@ impl Effect for ThresholdPressure {
         further_forms: &[
             &[("threshold_pressure.lasting", &[0.3e5])],
             &[("threshold_pressure.lasting", &[0.3e5]), ("threshold_pressure.onset", &[0.3e5])],
+            &[("threshold_pressure.lasting", &[0.3e5]), ("threshold_pressure.decrease_with_contraction", &[0.5])],
         ],
         refinements: &[
             ("threshold_pressure.exponent", &[1.5, 2.5]),
@@ -84,13 +85,20 @@ impl Effect for ThresholdPressure {
         let power = if self.exponent == 1.0 { relative } else { relative.powf(self.exponent) };
         let contracted = 1.0 - self.decrease_with_contraction * at.relative_contraction();
         // A pressure that was negative before is no business of this effect.
-        let lost = self.lasts(at.gauge_pressure) + self.lost * (-power).exp() * contracted.max(0.0);
+        let lost = (self.lasts(at.gauge_pressure) + self.lost * (-power).exp()) * contracted.max(0.0);
         (pressure - lost).max(pressure.min(0.0))
     }
 
     fn sentence(&self) -> String {
         if self.lost == 0.0 {
-            return format!("The muscle responds late: {:.2} bar are lost before it does.", 1e-5 * self.lasting);
+            let at_once = 1e-5 * self.lasting;
+            let less = 100.0 * self.decrease_with_contraction;
+            let then = if less == 0.0 {
+                String::new()
+            } else {
+                format!(" at rest length, {less:.0} % less at 0.1 m of contraction")
+            };
+            return format!("The muscle responds late: {at_once:.2} bar are lost before it does{then}.");
         }
         let at_one_bar = self.lasts(1e5) + self.lost * (-(1e5 / self.fade).powf(self.exponent)).exp();
         format!(
