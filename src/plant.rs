@@ -2,7 +2,7 @@
 
 use crate::effects::{Effects, Point, Readings};
 use crate::memory::{Line, PlantMemory};
-use crate::model::{Clock, Documentation, Extended, Extent, Feedthrough, Passage, Step, System};
+use crate::model::{Clock, Documentation, Extended, Extent, Feedthrough, Passage, State, Step, System};
 use crate::muscle::{bisect, force_equations};
 use crate::parameters::Parameters;
 use crate::variables::Signals;
@@ -326,7 +326,7 @@ pub fn quasi_steady_rates(
 ) -> [f64; 3] {
     let still = Parameters { effects: parameters.effects.at_rest(), ..*parameters };
     let state = hanging_state(&still, &moved(pressure, contraction, velocity));
-    let mut rates = state;
+    let mut rates = Extended::ZERO;
     PneumaticMuscle::rates(&still, &MuscleInputs { command, external_force: 0.0 }, &state, &mut rates);
     [rates.0[0], rates.0[1], rates.0[2]]
 }

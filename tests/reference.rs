@@ -330,6 +330,10 @@ fn effects_agree_with_scipy() {
         ),
         ("wrong_bore", &[("force_gain.relative_error", 0.08), ("force_gain.elastic_share", 0.5)]),
         (
+            "stretching_threads",
+            &[("force_gain.relative_error", 0.06), ("force_gain.bend", -0.02), ("force_gain.curvature", -0.012)],
+        ),
+        (
             "stiff_ends",
             &[
                 ("end_effects.excess", 0.06),

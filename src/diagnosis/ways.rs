@@ -73,7 +73,7 @@ pub fn better<'a>(
 /// What was found where the coefficients of the nominal model may be off in one way.
 pub struct Found<'a> {
     /// Where it was looked for.
-    pub search: Search<'a>,
+    search: Search<'a>,
     /// What came of it.
     pub chosen: Chosen,
 }

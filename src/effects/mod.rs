@@ -673,7 +673,20 @@ impl Effects {
 
 #[cfg(test)]
 mod tests {
-    use super::Effects;
+    use super::{Effects, Readings};
+
+    #[test]
+    fn a_curved_scale_is_a_cubic_through_its_error_at_the_middle() {
+        let mut effects = Effects::default();
+        let own = &mut effects.force_sensor_gain;
+        (own.relative_error, own.bend, own.curvature) = (-0.06, 0.01, -0.02);
+        // F = r 400 N reads 400 (r (1 − 0.06 − 0.01 + 0.02) + 0.01 r² − 0.02 r³).
+        for (ratio, reading) in [(0.0, 0.0), (0.5, 190.0), (1.0, 376.0), (2.0, 712.0)] {
+            let force = 400.0 * ratio;
+            let shown = effects.readings(Readings { time: 0.0, contraction: 0.0, gauge_pressure: 0.0, force });
+            assert!((shown.force - reading).abs() < 1e-9, "{ratio}: {}", shown.force);
+        }
+    }
 
     #[test]
     fn what_ends_at_a_bound_is_no_cause_but_for_limits_of_nature() {

@@ -92,11 +92,12 @@ impl Effect for ThresholdPressure {
     fn sentence(&self) -> String {
         if self.lost == 0.0 {
             let at_once = 1e-5 * self.lasting;
-            let less = 100.0 * self.decrease_with_contraction;
-            let then = if less == 0.0 {
+            let word = if self.decrease_with_contraction > 0.0 { "less" } else { "more" };
+            let percent = 100.0 * self.decrease_with_contraction.abs();
+            let then = if percent == 0.0 {
                 String::new()
             } else {
-                format!(" at rest length, {less:.0} % less at 0.1 m of contraction")
+                format!(" at rest length, {percent:.0} % {word} at 0.1 m of contraction")
             };
             return format!("The muscle responds late: {at_once:.2} bar are lost before it does{then}.");
         }

@@ -607,6 +607,14 @@ class WrongBore(Plant):
         return 1.08 * pressure * VIRTUAL_AREA_1000.area(x) + 1.04 * VIRTUAL_AREA_1000.elastic_force(x)
 
 
+class StretchingThreads(Plant):
+    """6 % stronger at 400 N, and less so the more they are pulled: a cubic of the force."""
+
+    def static_force(self, pressure, x, own):
+        force = super().static_force(pressure, x, own)
+        return 1.06 * force - 0.02 * force * (force / 400 - 1) - 0.012 * force * ((force / 400) ** 2 - 1)
+
+
 class StiffEnds(Plant):
     """The middle of the braid contracts more, and the membrane along its whole length a quarter of that more."""
 
@@ -673,8 +681,8 @@ class LaidRope(Plant):
 
 class Threshold(Plant):
     def static_force(self, pressure, x, own):
-        lost = 0.1e5 * (1 - np.exp(-pressure / 0.5e5)) + 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5)) * (1 - 3 * x)
-        return super().static_force(pressure - lost, x, own)
+        lost = 0.1e5 * (1 - np.exp(-pressure / 0.5e5)) + 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5))
+        return super().static_force(pressure - lost * (1 - 3 * x), x, own)
 
 
 class Friction(Plant):
@@ -786,6 +794,7 @@ CASES = [
     Case("stiffer_end", StifferEnd(), STAIRS),
     Case("slow_start", SlowStart(), STAIRS),
     Case("wrong_bore", WrongBore(), STAIRS),
+    Case("stretching_threads", StretchingThreads(), STAIRS),
     Case("stiff_ends", StiffEnds(), STAIRS),
     Case("counterweight", Counterweight(), STAIRS),
     Case("series_elasticity", SeriesElasticity(), RAMPS),
