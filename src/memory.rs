@@ -258,6 +258,8 @@ pub struct Slack {
     pub play: f64,
     /// By which share of it the widths differ at most.
     pub play_spread: f64,
+    /// By how much the half widths grow with the command, V/V; below one.
+    pub play_growth: f64,
     /// Deviation at which a stuck pilot jumps to the command, V.
     pub stiction: f64,
     /// How long a jump takes, s: it lands where the line is by then.
@@ -271,12 +273,13 @@ pub struct Slack {
 impl Slack {
     /// Whether the pilot just follows.
     pub fn is_none(&self) -> bool {
-        self.play == 0.0 && self.stiction == 0.0
+        self.play == 0.0 && self.play_growth == 0.0 && self.stiction == 0.0
     }
 
-    /// Half widths of the plays that share the pilot, V.
-    fn half_widths(&self) -> [f64; PLAYS] {
-        from_fn(|k| self.play * (1.0 + self.play_spread * (2.0 * k as f64 / (PLAYS - 1) as f64 - 1.0)))
+    /// Half widths at a command in V of the plays that share the pilot, V.
+    fn half_widths(&self, command: f64) -> [f64; PLAYS] {
+        let share = |k: usize| 1.0 + self.play_spread * (2.0 * k as f64 / (PLAYS - 1) as f64 - 1.0);
+        from_fn(|k| self.play * share(k) + self.play_growth * command)
     }
 }
 
@@ -293,14 +296,15 @@ struct Pilot {
 
 impl Pilot {
     fn at_rest(slack: &Slack, command: f64) -> Self {
-        let behind_play = slack.half_widths().map(|half_width| command + half_width * slack.start);
-        Self { behind_play, stuck_at: command + slack.play * slack.start, steep: 0.0, slides: 0.0 }
+        let behind_play = slack.half_widths(command).map(|half_width| command + half_width * slack.start);
+        let stuck_at = behind_play.iter().sum::<f64>() / PLAYS as f64;
+        Self { behind_play, stuck_at, steep: 0.0, slides: 0.0 }
     }
 
     /// Follows a line of the command, and tells the lines that come of it.
     fn follow(&mut self, slack: &Slack, line: Line, mut tell: impl FnMut(Line)) {
         let Self { behind_play, stuck_at, steep, slides } = self;
-        follow_with_plays(behind_play, slack.half_widths(), line, |line| {
+        follow_with_plays(behind_play, slack, line, |line| {
             let threshold = slack.stiction + slack.jump_time * line.slope.abs();
             if slack.stiction == 0.0 {
                 tell(line);
@@ -319,14 +323,18 @@ impl Pilot {
 }
 
 /// Plays side by side: each position moves only where the line pushes it, and their mean is told.
-fn follow_with_plays(positions: &mut [f64; PLAYS], half_widths: [f64; PLAYS], line: Line, mut tell: impl FnMut(Line)) {
+fn follow_with_plays(positions: &mut [f64; PLAYS], slack: &Slack, line: Line, mut tell: impl FnMut(Line)) {
     let direction = if line.slope < 0.0 { -1.0 } else { 1.0 };
+    let half_widths = slack.half_widths(line.value);
+    // The flank that pushes goes slower where the play grows, and faster where it shrinks.
+    let slope = line.slope * (1.0 - direction * slack.play_growth);
+    let flank = |k: usize, after: f64| line.value - direction * half_widths[k] + slope * after;
     // Until the pushing flank has come to each position.
     let rests: [f64; PLAYS] = from_fn(|k| {
         // Not `clamp`, which panics where a derivative tries a width below zero.
         positions[k] = positions[k].max(line.value - half_widths[k]).min(line.value + half_widths[k]);
-        let gap = direction * (positions[k] - line.value) + half_widths[k];
-        if line.slope == 0.0 { f64::INFINITY } else { gap / line.slope.abs() }
+        let gap = direction * (positions[k] - flank(k, 0.0));
+        if slope == 0.0 { f64::INFINITY } else { gap / slope.abs() }
     });
     let is_pushed = |k: usize, after: f64| rests[k] <= after + SAME_INSTANT;
     let mut from = 0.0;
@@ -335,15 +343,15 @@ fn follow_with_plays(positions: &mut [f64; PLAYS], half_widths: [f64; PLAYS], li
         let until = later.fold(line.span, f64::min);
         let pushed = (0..PLAYS).filter(|k| is_pushed(*k, from)).count();
         let position = |k: usize| {
-            if is_pushed(k, from) { line.at(from) - direction * half_widths[k] } else { positions[k] }
+            if is_pushed(k, from) { flank(k, from) } else { positions[k] }
         };
         let value = (0..PLAYS).map(position).sum::<f64>() / PLAYS as f64;
-        let slope = line.slope * (pushed as f64 / PLAYS as f64);
+        let slope = slope * (pushed as f64 / PLAYS as f64);
         tell(Line { start: line.start + from, span: until - from, value, slope });
         from = until;
     }
     for k in (0..PLAYS).filter(|k| rests[*k] < line.span - SAME_INSTANT) {
-        positions[k] = line.at(line.span) - direction * half_widths[k];
+        positions[k] = flank(k, line.span);
     }
 }
 

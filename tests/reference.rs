@@ -159,6 +159,7 @@ fn effects_agree_with_scipy() {
         ("uneven_dead_time", &[("valve_dead_time.delay", 0.0373), ("valve_dead_time.falling_excess", 0.5)]),
         ("play", &[("valve_dead_band.play", 0.11)]),
         ("spread_play", &[("valve_dead_band.play", 0.11), ("valve_dead_band.play_spread", 0.8)]),
+        ("growing_play", &[("valve_dead_band.play", 0.04), ("valve_dead_band.play_growth", 0.06)]),
         ("stiction", &[("valve_dead_band.stiction", 0.17)]),
         ("late_stiction", &[("valve_dead_band.stiction", 0.17), ("valve_dead_band.jump_time", 0.01)]),
         (
@@ -345,7 +346,14 @@ fn effects_agree_with_scipy() {
         ("tapered_ends", &[("end_effects.taper", 0.18), ("end_effects.taper_length", 0.04)]),
         ("rope", &[("series_elasticity.load_compliance", 1.0 / 15e3)]),
         ("wire", &[("series_elasticity.load_compliance", 1.0 / 2e5)]),
-        ("series_elasticity", &[("series_elasticity.compliance", -8e-6), ("series_elasticity.exponent", 0.85)]),
+        (
+            "series_elasticity",
+            &[
+                ("series_elasticity.compliance", -8e-6),
+                ("series_elasticity.exponent", 0.85),
+                ("series_elasticity.toe_force", 25.0),
+            ],
+        ),
         (
             "threshold",
             &[

@@ -6,9 +6,9 @@ crate::variables::variables! {
     /// # Model
     /// Between muscle and load: the load moves by x, the muscle contracts by x + c F₀ g(F) with F₀ = 400 N and a pull
     /// F > 0 in the cable; the position sensor shows x. Beside the path of the load, where the frame that carries the sensor gives way:
-    /// x_measured ← x + s F₀ g(F). `load_compliance` c, `compliance` s of either sign; g(F) = (F/F₀)ᵉ, `exponent` e below 1 for a
-    /// cable that hardens, or ((F + F₁)ᵉ − F₁ᵉ)/((F₀ + F₁)ᵉ − F₁ᵉ) for one that hardens beyond a `toe_force` F₁ only: the smaller e, the
-    /// sooner, as a logarithm for 0 and to an end below.
+    /// x_measured ← x + s F₀ g(F). `load_compliance` c, `compliance` s of either sign; g(F) = ((F + F₁)ᵉ − F₁ᵉ)/((F₀ + F₁)ᵉ − F₁ᵉ),
+    /// `exponent` e below 1 for a cable that hardens beyond a `toe_force` F₁: the smaller e, the sooner, as a logarithm for 0 and to an
+    /// end below.
     ///
     /// # In the data
     /// The residual of the contraction is in proportion to the force; a load behind a cable also swings more slowly. A
@@ -20,7 +20,7 @@ crate::variables::variables! {
     /// muscle moves by itself: its damping, friction and creep are of its own contraction. 10⁵ to 10⁶ N/m are usual stiffnesses.
     ///
     /// # Reference
-    /// Hooke's law; power law of slack strands.
+    /// Hooke's law; power law of strands that are taut one after the other.
     pub struct SeriesElasticity in "series_elasticity." as Tunable {
         /// Reading per pull, at 400 N
         compliance: f64 = 0.0, METRE_PER_NEWTON, (-1e-4..=1e-4);
@@ -29,17 +29,12 @@ crate::variables::variables! {
         /// Power of the pull with which it stretches; at least 0.3 without a toe
         exponent: f64 = 1.0, ONE, (-3.0..=3.0);
         /// Pull beyond which it hardens
-        toe_force: f64 = 0.0, NEWTON, (0.0..=MOST_TOE);
+        toe_force: f64 = 10.0, NEWTON, (10.0..=MOST_TOE);
     }
 }
 
 /// Tension in N up to which a cable goes on as it is when slack: with a tension below zero for its slack the muscle has a state there, too.
 const NEARLY_SLACK: f64 = 1.0;
-/// Smallest power without a toe: the stiffness of less is that of a wall.
-const LEAST_EXPONENT: f64 = 0.3;
-/// Pull in N below which a toe is none, and the one that makes up for a smaller power.
-const LEAST_TOE: f64 = 1e-3;
-const OWN_TOE: f64 = 10.0;
 /// Toe force in N from which on nothing is loaded beyond it.
 const MOST_TOE: f64 = 5e3;
 
@@ -54,9 +49,6 @@ impl SeriesElasticity {
 
     /// Way at a pull in N, relative to that at the reference.
     fn course(&self, force: f64) -> f64 {
-        if self.toe_force < LEAST_TOE {
-            return (force / REFERENCE_FORCE).powf(self.exponent.max(LEAST_EXPONENT));
-        }
         // Nearer to zero the differences are those of rounding.
         let exponent = self.exponent.abs().max(1e-6).copysign(self.exponent);
         let grown = |force: f64| (force / self.toe_force).ln_1p();
@@ -77,6 +69,16 @@ impl Effect for SeriesElasticity {
         forms: &[
             &[("series_elasticity.load_compliance", &[5e-6])],
             &[("series_elasticity.compliance", &[-5e-6, 5e-6])],
+            &[
+                ("series_elasticity.load_compliance", &[5e-6]),
+                ("series_elasticity.exponent", &[0.0]),
+                ("series_elasticity.toe_force", &[100.0]),
+            ],
+            &[
+                ("series_elasticity.compliance", &[-5e-6, 5e-6]),
+                ("series_elasticity.exponent", &[0.0]),
+                ("series_elasticity.toe_force", &[100.0]),
+            ],
         ],
         further_forms: &[],
         refinements: &[("series_elasticity.exponent", &[0.8]), ("series_elasticity.toe_force", &[100.0])],
@@ -90,7 +92,7 @@ impl Effect for SeriesElasticity {
     }
 
     fn is_plausible(&self) -> bool {
-        (self.exponent > LEAST_EXPONENT || self.toe_force > OWN_TOE) && self.toe_force < MOST_TOE
+        self.toe_force < MOST_TOE
     }
 
     fn rests(&self) -> bool {

@@ -6,7 +6,8 @@ crate::variables::variables! {
     ///
     /// # Model
     /// Play: the pilot w moves only where the command u pushes it, |u − w| ≤ `play`; with `play_spread` d it is the mean of five
-    /// plays from 1 − d to 1 + d times as wide, as dry friction at a spring that sets in gradually. Stiction: it rests until
+    /// plays from 1 − d to 1 + d times as wide, as dry friction at a spring that sets in gradually; by `play_growth` b it is
+    /// wider by b u, as friction that the pressure presses on. Stiction: it rests until
     /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`; it sticks again at once or, where u is faster than
     /// `sliding_speed`, once u turns. Behind a play of (S − J)/2, a stiction of J then makes the band S and the slip jump J of
     /// Choudhury. Overlap: the spool opens no port while the
@@ -31,6 +32,8 @@ crate::variables::variables! {
         play: f64 = 0.0, VOLT, (0.0..=2.0);
         /// By which share of its mean the play's width differs at most
         play_spread: f64 = 0.0, ONE, (0.0..=1.0);
+        /// By how much the half width of the play grows with the command
+        play_growth: f64 = 0.0, ONE, (0.0..=0.3);
         /// Deviation from the command at which a stuck pilot jumps to it
         stiction: f64 = 0.0, VOLT, (0.0..=2.0);
         /// How long a jump of a stuck pilot takes
@@ -112,13 +115,14 @@ impl Effect for ValveDeadBand {
         ]],
         refinements: &[
             ("valve_dead_band.start", &[0.3]),
+            ("valve_dead_band.play_growth", &[0.01]),
             ("valve_dead_band.jump_time", &[2.5e-4, 5e-4, 1e-3, 2.5e-3]),
             ("valve_dead_band.overlap_rounding", &[0.5]),
         ],
     };
 
     fn is_neutral(&self) -> bool {
-        self.play == 0.0 && self.stiction == 0.0 && self.pressure_overlap == 0.0
+        [self.play, self.play_growth, self.stiction, self.pressure_overlap] == [0.0; 4]
     }
 
     /// A pilot that sticks ends each fast move anywhere within its threshold; one that slides goes on to its end.
@@ -140,8 +144,8 @@ impl Effect for ValveDeadBand {
     }
 
     fn slack(&self) -> Slack {
-        let Self { play, play_spread, stiction, jump_time, sliding_speed, start, .. } = *self;
-        Slack { play, play_spread, stiction, jump_time, sliding_speed, start }
+        let Self { play, play_spread, play_growth, stiction, jump_time, sliding_speed, start, .. } = *self;
+        Slack { play, play_spread, play_growth, stiction, jump_time, sliding_speed, start }
     }
 
     fn target_pressure(&self, at: &Point, _own: &[f64], target: f64) -> f64 {
@@ -156,8 +160,12 @@ impl Effect for ValveDeadBand {
 
     fn sentence(&self) -> String {
         let mut parts = Vec::new();
-        if self.play > 0.0 {
-            parts.push(format!("its pilot has a play of {:.0} mV", 2e3 * self.play));
+        if self.play > 0.0 || self.play_growth > 0.0 {
+            let growth = match self.play_growth {
+                0.0 => String::new(),
+                growth => format!(" and {:.0} mV more per volt of the command", 2e3 * growth),
+            };
+            parts.push(format!("its pilot has a play of {:.0} mV{growth}", 2e3 * self.play));
         }
         if self.stiction > 0.0 {
             let off = if self.play > 0.0 { "beyond it by" } else { "off by" };

@@ -307,8 +307,8 @@ class UnevenDeadTime(Plant):
 
 
 class Play(Plant):
-    def __init__(self, half=0.11):
-        self.half = half
+    def __init__(self, half=0.11, growth=0.0):
+        self.half, self.growth = half, growth
 
     def seen(self, command):
         """Every straight piece is cut where the gap closes: there the position begins or ends to follow."""
@@ -316,12 +316,14 @@ class Play(Plant):
         for t0, t1, u, s in super().seen(command):
             cuts = [t0, t1]
             if s != 0:
-                cuts += [t for t in (t0 + (position + sign * self.half - u) / s for sign in (-1, 1)) if t0 < t < t1]
+                met = ((position + sign * self.half) / (1 - sign * self.growth) for sign in (-1, 1))
+                cuts += [t for t in (t0 + (command - u) / s for command in met) if t0 < t < t1]
             for a, b in zip(sorted(cuts)[:-1], sorted(cuts)[1:]):
                 middle = u + s * ((a + b) / 2 - t0)
-                held = abs(middle - position) <= self.half + 1e-12
-                at = lambda t: u + s * (t - t0) - np.sign(s) * self.half
-                result.append((a, b, position, 0.0) if held else (a, b, at(a), s))
+                held = abs(middle - position) <= self.half + self.growth * middle + 1e-12
+                follows = 1 - np.sign(s) * self.growth
+                at = lambda t: (u + s * (t - t0)) * follows - np.sign(s) * self.half
+                result.append((a, b, position, 0.0) if held else (a, b, at(a), s * follows))
                 position = position if held else at(b)
         return result
 
@@ -671,7 +673,8 @@ class Wire(Rope):
 
 class SeriesElasticity(Plant):
     def readings(self, x, force, own):
-        return x - 8e-6 * 400 * (force / 400) ** 0.85
+        grown = (force + 25) ** 0.85 - 25**0.85
+        return x - 8e-6 * 400 * grown / (425**0.85 - 25**0.85)
 
 
 class LaidRope(Plant):
@@ -769,6 +772,7 @@ CASES = [
     Case("dead_time", DeadTime(), RAMPS),
     Case("play", Play(), RAMPS),
     Case("spread_play", SpreadPlay(), RAMPS),
+    Case("growing_play", Play(0.04, 0.06), RAMPS),
     Case("stiction", Stiction(), RAMPS),
     Case("late_stiction", LateStiction(), RAMPS),
     Case("sliding", Sliding(), ramps([(0, 1.0), (0.3, 1.0), (1.2, 1.7), (1.6, 1.7), (2.2, 2.1), (2.8, 1.4), (4, 1.7), (5, 1.7)])),
