@@ -253,10 +253,10 @@ fn nominal_pressure_rate(parameters: &Parameters, command: f64, gauge_pressure: 
     parameters.valve.bandwidth * (parameters.valve.target_pressure(command) - gauge_pressure)
 }
 
-/// Masses in kg of the load that weigh and that move, in this order.
+/// Masses in kg of the load that weigh and that move at a contraction in m, in this order.
 #[inline]
-pub fn masses(parameters: &Parameters) -> (f64, f64) {
-    parameters.effects.masses(parameters.load.mass)
+pub fn masses(parameters: &Parameters, contraction: f64) -> (f64, f64) {
+    parameters.effects.masses(parameters.load.mass, contraction)
 }
 
 /// Name of the contraction in m where the muscle would be longer than its threads, or shorter than nothing.
@@ -355,9 +355,15 @@ pub fn resting_pressure(parameters: &Parameters, contraction: f64, weight: f64) 
 ///
 /// Among several it is the longest muscle whose stiffness is positive.
 pub fn equilibrium(parameters: &Parameters, gauge_pressure: f64, weight: f64) -> Option<f64> {
+    equilibrium_with(parameters, gauge_pressure, |_| weight)
+}
+
+/// The same of a weight in N that may depend on the contraction in m.
+fn equilibrium_with(parameters: &Parameters, gauge_pressure: f64, weight: impl Fn(f64) -> f64) -> Option<f64> {
     let muscle = &parameters.muscle;
-    let surplus =
-        |contraction: f64| resting_pull(parameters, &at_start(parameters, gauge_pressure, contraction)) - weight;
+    let surplus = |contraction: f64| {
+        resting_pull(parameters, &at_start(parameters, gauge_pressure, contraction)) - weight(contraction)
+    };
     let samples = 300;
     let at = |k: i32| muscle.rest_length * (-0.2 + 0.7 * f64::from(k) / f64::from(samples));
     let bracket = (0..samples).find(|&k| surplus(at(k)) > 0.0 && surplus(at(k + 1)) <= 0.0)?;
@@ -404,9 +410,11 @@ impl System for PneumaticMuscle {
     const SCALE: Self::State = Extended(Effects::scales(&[1e5, 0.1, 0.1]));
 
     fn initial_state(parameters: &Parameters, inputs: &MuscleInputs) -> Result<Self::State> {
-        let ((mass, _), gauge_pressure) = (masses(parameters), parameters.initial.gauge_pressure);
-        let hanging = equilibrium(parameters, gauge_pressure, mass * GRAVITY + inputs.external_force);
-        let contraction = hanging.ok_or(Error::NoEquilibrium { mass, gauge_pressure })?;
+        let (mass, gauge_pressure) =
+            (|contraction| masses(parameters, contraction).0, parameters.initial.gauge_pressure);
+        let weight = |contraction| mass(contraction) * GRAVITY + inputs.external_force;
+        let hanging = equilibrium_with(parameters, gauge_pressure, weight);
+        let contraction = hanging.ok_or_else(|| Error::NoEquilibrium { mass: mass(0.0), gauge_pressure })?;
         Ok(hanging_state(parameters, &at_start(parameters, gauge_pressure, contraction)))
     }
 
@@ -417,7 +425,7 @@ impl System for PneumaticMuscle {
         rates.0[1] = at.contraction_velocity;
         let (at, force) = pulling(parameters, at, own);
         rates.0[0] = pressure_rate(parameters, &at, own);
-        let (weighing, moving) = masses(parameters);
+        let (weighing, moving) = masses(parameters, state.0[1]);
         rates.0[2] = (force - inputs.external_force) / moving - GRAVITY * (weighing / moving);
         parameters.effects.rates(&with_pull(parameters, &at), own, &mut rates.0[3..]);
     }
@@ -453,7 +461,7 @@ impl System for PneumaticMuscle {
     }
 
     fn left_range(parameters: &Parameters, _: &Self::Inputs, state: &Self::State) -> Option<&'static str> {
-        let (weighing, moving) = masses(parameters);
+        let (weighing, moving) = masses(parameters, state.0[1]);
         if weighing <= 0.0 || moving <= 0.0 {
             return Some("load.mass with payload_mass");
         }

@@ -408,8 +408,9 @@ impl ClosedLoop {
 /// The parameters with the initial pressure at which the load hangs still where the reference starts.
 pub fn at_rest_on_reference(parameters: &Parameters) -> Parameters {
     let mut parameters = *parameters;
-    let (weighing, _) = masses(&parameters);
-    parameters.initial.gauge_pressure = resting_pressure(&parameters, parameters.reference.start, weighing * GRAVITY);
+    let start = parameters.reference.start;
+    let (weighing, _) = masses(&parameters, start);
+    parameters.initial.gauge_pressure = resting_pressure(&parameters, start, weighing * GRAVITY);
     parameters
 }
 

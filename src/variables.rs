@@ -36,6 +36,7 @@ pub mod units {
         PER_METRE = "1/m", "Curvature", 1.0, [0, -1, 0, 0, 0];
         SECOND = "s", "Time", 1.0, [0, 0, 1, 0, 0];
         KILOGRAM = "kg", "Mass", 10.0, [1, 0, 0, 0, 0];
+        KILOGRAM_PER_METRE = "kg/m", "LinearDensity", 10.0, [1, -1, 0, 0, 0];
         METRE_PER_SECOND = "m/s", "Velocity", 0.1, [0, 1, -1, 0, 0];
         METRE_PER_SECOND2 = "m/s2", "Acceleration", 1.0, [0, 1, -2, 0, 0];
         NEWTON = "N", "Force", 100.0, [1, 1, -2, 0, 0];

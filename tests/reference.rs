@@ -343,6 +343,7 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("counterweight", &[("payload_mass.additional_mass", -3.0), ("payload_mass.inertia", 6.0)]),
+        ("chain", &[("payload_mass.per_length", 12.0)]),
         ("tapered_ends", &[("end_effects.taper", 0.18), ("end_effects.taper_length", 0.04)]),
         ("rope", &[("series_elasticity.load_compliance", 1.0 / 15e3)]),
         ("wire", &[("series_elasticity.load_compliance", 1.0 / 2e5)]),

@@ -217,8 +217,8 @@ impl<'a> Chain<'a> {
         let (force, mass) = (self.recording.get(Signal::Force)?, self.recording.load_mass()?);
         let contraction = self.true_contraction()?;
         let effects = &self.parameters.effects;
-        let (weighing, moving) = effects.masses(mass);
         let needed = parabolas(&self.recording.time, &contraction).zip(&contraction).map(|(motion, contraction)| {
+            let (weighing, moving) = effects.masses(mass, *contraction);
             let force = weighing * GRAVITY + moving * motion.curvature;
             (contraction, force)
         });

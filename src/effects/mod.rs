@@ -282,8 +282,8 @@ pub trait Effect: Declared + Default {
     fn stretch(&self, _tension: f64) -> f64 {
         0.0
     }
-    /// Mass in kg that weighs.
-    fn mass(&self, mass: f64) -> f64 {
+    /// Mass in kg that weighs at a contraction in m.
+    fn mass(&self, mass: f64, _contraction: f64) -> f64 {
         mass
     }
     /// Mass in kg that moves, given the one that weighs.
@@ -575,11 +575,11 @@ macro_rules! effects {
                 0.0 $(+ self.$field.stretch(tension))*
             }
 
-            /// Masses in kg of a load that weigh and that move, in this order, where one was entered.
+            /// Masses in kg of a load that weigh and that move at a contraction in m, in this order, where one was entered.
             #[inline]
-            pub fn masses(&self, entered: f64) -> (f64, f64) {
+            pub fn masses(&self, entered: f64, contraction: f64) -> (f64, f64) {
                 let mut weighing = entered;
-                $(weighing = self.$field.mass(weighing);)*
+                $(weighing = self.$field.mass(weighing, contraction);)*
                 let mut moving = weighing;
                 $(moving = self.$field.inertia(moving);)*
                 (weighing, moving)

@@ -4,13 +4,16 @@ crate::variables::variables! {
     /// A load that is not what was entered.
     ///
     /// # Model
-    /// M ← M (1 + m) + ΔM + ΔM_k: `additional_mass` ΔM, the same with every load (a hanger that was not weighed), ΔM_k by which a load was
-    /// entered wrongly in the `second` or the `third` recording, `relative_error` m of what was entered (a wrong scale). `inertia` ΔI moves along without a weight: a pulley's moment of
+    /// M ← M (1 + m) + ΔM + ΔM_k + q x: `additional_mass` ΔM, the same with every load (a hanger that was not weighed), ΔM_k by which a load was
+    /// entered wrongly in the `second` or the `third` recording, `relative_error` m of what was entered (a wrong scale), `per_length` q of a chain that is lifted from the floor. `inertia` ΔI moves along without a weight: a pulley's moment of
     /// inertia over its radius squared, or twice a counterweight −ΔM, whose weight is taken away and whose mass moves along.
     ///
     /// # In the data
     /// The force residual is in proportion to g + d²x/dt², also at rest; the resonance shifts. With one load only it
     /// looks like a force gain; a second known load separates them.
+    ///
+    /// # Validity
+    /// What is lifted comes to speed without a jerk: its momentum flow q (dx/dt)² is left out.
     ///
     /// # Reference
     /// Thesis eq. 5.4.
@@ -25,6 +28,8 @@ crate::variables::variables! {
         recording: f64 = 1.0, ONE, (1.0..=1000.0);
         /// Relative error of the entered mass
         relative_error: f64 = 0.0, ONE, (-0.9..=3.0);
+        /// Mass per metre of contraction that is lifted, too
+        per_length: f64 = 0.0, KILOGRAM_PER_METRE, (-200.0..=200.0);
         /// Mass that moves along and does not weigh
         inertia: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
     }
@@ -34,7 +39,7 @@ impl Effect for PayloadMass {
     const DESCRIPTION: Description = Description {
         name: "payload_mass",
         meaning: "the load is not what was entered",
-        equation: "M <- M (1 + m) + dM + dM_k;  weight M g, inertia M + dI",
+        equation: "M <- M (1 + m) + dM + dM_k + q x;  weight M g, inertia M + dI",
         signature: "force residual in proportion to g + acceleration, also at rest",
         experiment: "two known masses, static and dynamic",
         reference: "thesis eq. 5.4",
@@ -42,6 +47,7 @@ impl Effect for PayloadMass {
         holds: Holds::Exactly,
         forms: &[&[("payload_mass.additional_mass", &[2.0, -2.0])], &[("payload_mass.relative_error", &[0.1, -0.1])]],
         further_forms: &[
+            &[("payload_mass.additional_mass", &[0.5]), ("payload_mass.per_length", &[20.0, -20.0])],
             &[("payload_mass.additional_mass", &[0.5]), ("payload_mass.second", &[2.0, -2.0])],
             &[
                 ("payload_mass.additional_mass", &[0.5]),
@@ -57,12 +63,12 @@ impl Effect for PayloadMass {
     };
 
     fn is_neutral(&self) -> bool {
-        [self.additional_mass, self.second, self.third, self.relative_error, self.inertia] == [0.0; 5]
+        [self.additional_mass, self.second, self.third, self.relative_error, self.per_length, self.inertia] == [0.0; 6]
     }
 
-    fn mass(&self, mass: f64) -> f64 {
+    fn mass(&self, mass: f64, contraction: f64) -> f64 {
         let own = of_recording(self.recording, [self.second, self.third]);
-        mass * (1.0 + self.relative_error) + self.additional_mass + own
+        mass * (1.0 + self.relative_error) + self.additional_mass + own + self.per_length * contraction
     }
 
     fn inertia(&self, mass: f64) -> f64 {
@@ -78,10 +84,11 @@ impl Effect for PayloadMass {
         let anew = told_anew([self.second, self.third], |own, recording| {
             format!(", {:+.2} kg in the {recording} recording", mass + own)
         });
+        let lifted = if_any(self.per_length, format!(", {:+.1} kg per metre that it is lifted", self.per_length));
         if percent == 0.0 {
-            return format!("The load is {:.2} kg {} than entered{anew}{inertia}.", mass.abs(), word(mass));
+            return format!("The load is {:.2} kg {} than entered{anew}{lifted}{inertia}.", mass.abs(), word(mass));
         }
         let beyond = if_any(mass, format!(", and {mass:+.2} kg"));
-        format!("The load is {:.1} % {} than entered{beyond}{anew}{inertia}.", percent.abs(), word(percent))
+        format!("The load is {:.1} % {} than entered{beyond}{anew}{lifted}{inertia}.", percent.abs(), word(percent))
     }
 }

@@ -26,7 +26,7 @@ crate::variables::variables! {
         compliance: f64 = 0.0, METRE_PER_NEWTON, (-1e-4..=1e-4);
         /// Stretch per pull, at 400 N, of what is between the muscle and its load
         load_compliance: f64 = 0.0, METRE_PER_NEWTON, (0.0..=1e-4);
-        /// Power of the pull with which it stretches; at least 0.3 without a toe
+        /// Power of the pull with which it stretches
         exponent: f64 = 1.0, ONE, (-3.0..=3.0);
         /// Pull beyond which it hardens
         toe_force: f64 = 10.0, NEWTON, (10.0..=MOST_TOE);

@@ -4,7 +4,7 @@ crate::variables::variables! {
     /// Pressure that is lost before the muscle responds.
     ///
     /// # Model
-    /// The area feels p − (l₀ + l exp(−(p/f)ᵉ)) (1 − d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
+    /// The area feels p − (l₀ + l exp(−(p/f)ᵉ)) exp(−d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
     /// `decrease_with_contraction` d, as a bladder comes to the braid while the muscle grows thick; `lasting` l₀ does not fade with the
     /// pressure and, with an `onset` o, is l₀ (1 − exp(−p/o)).
     ///
@@ -25,8 +25,8 @@ crate::variables::variables! {
         fade: f64 = 0.8e5, PASCAL, (0.2e5..=2.5e5);
         /// How suddenly the loss fades: 1 gradually
         exponent: f64 = 1.0, ONE, (0.5..=6.0);
-        /// Relative decrease of the loss at 0.1 m of contraction
-        decrease_with_contraction: f64 = 0.0, ONE, (-1.0..=2.0);
+        /// Decrease of the loss over 0.1 m of contraction, as a logarithm
+        decrease_with_contraction: f64 = 0.0, ONE, (-1.0..=3.0);
         /// Pressure that is lost at any pressure
         lasting: f64 = 0.0, PASCAL, (0.0..=4e5);
         /// Pressure over which that sets in
@@ -48,7 +48,7 @@ impl Effect for ThresholdPressure {
     const DESCRIPTION: Description = Description {
         name: "threshold_pressure",
         meaning: "pressure lost before the muscle responds, which matters at low pressure",
-        equation: "p <- max(0, p - (l0 (1 - exp(-p/o)) + l exp(-(p/f)^e)) (1 - d x/0.1 m))",
+        equation: "p <- max(0, p - (l0 (1 - exp(-p/o)) + l exp(-(p/f)^e)) exp(-d x/0.1 m))",
         signature: "force falls short at low pressure only, the same in both directions",
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
@@ -83,9 +83,9 @@ impl Effect for ThresholdPressure {
         }
         let relative = at.gauge_pressure.max(0.0) / self.fade;
         let power = if self.exponent == 1.0 { relative } else { relative.powf(self.exponent) };
-        let contracted = 1.0 - self.decrease_with_contraction * at.relative_contraction();
+        let contracted = (-self.decrease_with_contraction * at.relative_contraction()).exp();
         // A pressure that was negative before is no business of this effect.
-        let lost = (self.lasts(at.gauge_pressure) + self.lost * (-power).exp()) * contracted.max(0.0);
+        let lost = (self.lasts(at.gauge_pressure) + self.lost * (-power).exp()) * contracted;
         (pressure - lost).max(pressure.min(0.0))
     }
 
@@ -93,7 +93,7 @@ impl Effect for ThresholdPressure {
         if self.lost == 0.0 {
             let at_once = 1e-5 * self.lasting;
             let word = if self.decrease_with_contraction > 0.0 { "less" } else { "more" };
-            let percent = 100.0 * self.decrease_with_contraction.abs();
+            let percent = 100.0 * (-self.decrease_with_contraction).exp_m1().abs();
             let then = if percent == 0.0 {
                 String::new()
             } else {

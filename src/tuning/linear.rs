@@ -79,7 +79,7 @@ pub struct LinearPlant {
 impl LinearPlant {
     /// The plant with its load at rest at a contraction in m; by central differences of the model's own equations.
     pub fn at(parameters: &Parameters, contraction: f64) -> Self {
-        let (weighing, mass) = masses(parameters);
+        let (weighing, mass) = masses(parameters, contraction);
         let pressure = resting_pressure(parameters, contraction, weighing * GRAVITY);
         let rest = [pressure, contraction, 0.0];
         let command = pressure / parameters.valve.gain;

@@ -25,6 +25,7 @@ class Plant:
 
     own_scales = ()
     weighing = moving = MASS
+    lifted = 0.0
     start_velocity = 0.0
 
     def own_start(self, x):
@@ -632,6 +633,12 @@ class Counterweight(Plant):
     weighing, moving = MASS - 3.0, MASS + 3.0
 
 
+class Chain(Plant):
+    """A chain of 12 kg/m that is lifted from the floor."""
+
+    lifted = 12.0
+
+
 class TaperedEnds(Plant):
     """Of the pull of the pressure 18 % are missing at full length, and 37 % of that after 40 mm."""
 
@@ -685,7 +692,7 @@ class LaidRope(Plant):
 class Threshold(Plant):
     def static_force(self, pressure, x, own):
         lost = 0.1e5 * (1 - np.exp(-pressure / 0.5e5)) + 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5))
-        return super().static_force(pressure - lost * (1 - 3 * x), x, own)
+        return super().static_force(pressure - lost * np.exp(-3 * x), x, own)
 
 
 class Friction(Plant):
@@ -801,6 +808,7 @@ CASES = [
     Case("stretching_threads", StretchingThreads(), STAIRS),
     Case("stiff_ends", StiffEnds(), STAIRS),
     Case("counterweight", Counterweight(), STAIRS),
+    Case("chain", Chain(), STAIRS),
     Case("series_elasticity", SeriesElasticity(), RAMPS),
     Case("tapered_ends", TaperedEnds(), STAIRS),
     Case("rope", Rope(), THROWS),
@@ -818,7 +826,7 @@ CASES = [
 def start(case):
     """The load hangs in balance at the pressure that the first command asks for."""
     pressure, plant = VALVE_GAIN * case.command[0], case.plant
-    surplus = lambda x: plant.force(pressure, x, plant.start_velocity, plant.own_start(x)) - plant.weighing * GRAVITY
+    surplus = lambda x: plant.force(pressure, x, plant.start_velocity, plant.own_start(x)) - (plant.weighing + plant.lifted * x) * GRAVITY
     x = brentq(surplus, 0.0, 0.22, xtol=1e-15, rtol=1e-15)
     return np.array([pressure, x, plant.start_velocity, *plant.own_start(x)])
 
@@ -834,7 +842,8 @@ def solve(case):
     def derivative(t, state, t0, value, slope):
         pressure, x, velocity, *own = state
         target = VALVE_GAIN * (value + slope * (t - t0))
-        push = (plant.force(pressure, x, velocity, own) - plant.weighing * GRAVITY) / plant.moving
+        weight = (plant.weighing + plant.lifted * x) * GRAVITY
+        push = (plant.force(pressure, x, velocity, own) - weight) / (plant.moving + plant.lifted * x)
         own_rates = plant.own_rates(target, pressure, x, velocity, own)
         return [plant.rate(target, pressure, x, velocity, own), velocity, push, *own_rates]
 
