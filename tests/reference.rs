@@ -316,8 +316,8 @@ fn effects_agree_with_scipy() {
         (
             "stiffer_end",
             &[
-                ("bladder_stiffness.added_force", 40.0),
-                ("bladder_stiffness.added_growth", 0.45),
+                ("bladder_stiffness.added_force", 30.0 * 0.8_f64.exp_m1()),
+                ("bladder_stiffness.added_growth", 0.8),
                 ("bladder_stiffness.added_curvature", 0.3),
             ],
         ),

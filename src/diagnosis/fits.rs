@@ -199,15 +199,18 @@ impl<'a> Bench<'a> {
         self.with_fewer_free(fitted, &fitted.hypothesis.refined_as(is_wanted))
     }
 
-    /// A possible fit in the place of one that is impossible only by what ended at bounds of shapes: these at their defaults.
-    pub fn possible_instead(&self, fitted: &Fitted) -> Option<Fitted> {
-        let Fitted { hypothesis, parameters, .. } = fitted;
-        let at_ends = parameters.effects.at_ends();
-        if at_ends.is_empty() || hypothesis.parts.iter().any(|part| at_ends.contains(&part.size().0)) {
-            return None;
-        }
-        let parts = hypothesis.parts.iter().map(|part| part.holding(&at_ends)).collect();
-        self.with_fewer_free(fitted, &Hypothesis { parts, ..*hypothesis }).filter(Fitted::is_possible)
+    /// Possible fits in the place of one that is impossible only by what ended at bounds of shapes: these at their defaults, or all other
+    /// refinements, of which one may have pushed them there.
+    pub fn possible_instead(&self, fitted: &Fitted) -> impl Iterator<Item = Fitted> {
+        let parts = &fitted.hypothesis.parts;
+        let at_ends = fitted.parameters.effects.at_ends();
+        let is_by_shapes = !at_ends.is_empty() && !parts.iter().any(|part| at_ends.contains(&part.size().0));
+        let without_ends = parts.iter().map(|part| part.holding(&at_ends)).collect();
+        let without_others = parts.iter().map(|part| part.refined_as(|name| at_ends.contains(&name))).collect();
+        let fewer = is_by_shapes.then_some([without_ends, without_others]).into_iter().flatten();
+        let fewer = fewer.map(|parts| Hypothesis { parts, ..fitted.hypothesis });
+        let fewer = fewer.filter(|fewer| fewer.size() < fitted.hypothesis.size());
+        fewer.filter_map(|fewer| self.with_fewer_free(fitted, &fewer)).filter(Fitted::is_possible)
     }
 
     /// A hypothesis with the same effects of which fewer parameters are free, the others at their defaults; fitted anew.

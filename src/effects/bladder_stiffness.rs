@@ -1,15 +1,15 @@
 use super::{Description, Effect, Holds, Point};
 
 /// Beyond these it is no tube of rubber that adds its force: a stop, or something else that begins at some contraction.
-const LEAST_GROWTH: f64 = -0.5;
-const MOST_GROWTH: f64 = 1.5;
+const LEAST_GROWTH: f64 = -1.0;
+const MOST_GROWTH: f64 = 3.0;
 const MOST_CURVATURE: f64 = 1.0;
 
 crate::variables::variables! {
     /// A membrane that is stiffer or softer than nominal.
     ///
     /// # Model
-    /// F_e ← F_e (1 + c + c₁ x/0.1 m) − f s (1 + g (s − 1) + h (s − 1)²), s = x/0.1 m: `relative_change` c,
+    /// F_e ← F_e (1 + c + c₁ x/0.1 m) − f (eᵍˢ − 1)/(eᵍ − 1) (1 + h (s − 1)²), s = x/0.1 m: `relative_change` c,
     /// `change_with_contraction` c₁. What a tube of rubber beside the nominal one pulls back begins with zero: `added_force` f,
     /// `added_growth` g, `added_curvature` h.
     ///
@@ -21,7 +21,8 @@ crate::variables::variables! {
     /// ± 35 % are usual between specimens and with age.
     ///
     /// # Reference
-    /// Thesis eqs. 4.5 and 4.17 (elastic term); third order in the contraction of what a neo-Hookean, Gent or Fung tube adds.
+    /// Thesis eqs. 4.5 and 4.17 (elastic term). Y. Fung (1967), Elasticity of soft tissues in simple elongation,
+    /// doi 10.1152/ajplegacy.1967.213.6.1532 (exponential), and what differs from it in a neo-Hookean or Gent tube.
     pub struct BladderStiffness in "bladder_stiffness." as Tunable {
         /// Relative change of the elastic force
         relative_change: f64 = 0.0, ONE, (-0.9..=1.0);
@@ -29,10 +30,18 @@ crate::variables::variables! {
         change_with_contraction: f64 = 0.0, ONE, (-0.9..=0.9);
         /// Force beside the nominal one with which the membrane pulls back at 0.1 m of contraction
         added_force: f64 = 0.0, NEWTON, (-500.0..=500.0);
-        /// Relative growth of its stiffness from 0.1 m to 0.2 m
+        /// Growth of its stiffness over 0.1 m, as a logarithm
         added_growth: f64 = 0.0, ONE, (LEAST_GROWTH..=MOST_GROWTH);
-        /// Curvature of that growth
+        /// Further relative change of that force 0.1 m away from there, to either side
         added_curvature: f64 = 0.0, ONE, (-MOST_CURVATURE..=MOST_CURVATURE);
+    }
+}
+
+impl BladderStiffness {
+    /// What the tube pulls back with at a contraction in 0.1 m, relative to that at 0.1 m.
+    fn grown(&self, s: f64) -> f64 {
+        // Of nearly none the differences are those of rounding.
+        if self.added_growth.abs() < 1e-6 { s } else { (self.added_growth * s).exp_m1() / self.added_growth.exp_m1() }
     }
 }
 
@@ -40,7 +49,7 @@ impl Effect for BladderStiffness {
     const DESCRIPTION: Description = Description {
         name: "bladder_stiffness",
         meaning: "the passive elastic force differs from nominal",
-        equation: "F_e <- F_e (1 + c + c1 s) - f s (1 + g (s - 1) + h (s - 1)^2), s = x/0.1 m",
+        equation: "F_e <- F_e (1 + c + c1 s) - f (exp(g s) - 1)/(exp(g) - 1) (1 + h (s - 1)^2), s = x/0.1 m",
         signature: "force residual depends on contraction alone, also at zero pressure",
         experiment: "stretch the muscle without pressure; the same motion at two constant pressures",
         reference: "thesis eqs. 4.5, 4.17",
@@ -50,7 +59,7 @@ impl Effect for BladderStiffness {
             &[("bladder_stiffness.relative_change", &[0.15, -0.15, 0.03, -0.03])],
             &[
                 ("bladder_stiffness.added_force", &[60.0, -60.0, 12.0, -12.0]),
-                ("bladder_stiffness.added_growth", &[0.3]),
+                ("bladder_stiffness.added_growth", &[0.6]),
             ],
         ],
         further_forms: &[],
@@ -69,8 +78,7 @@ impl Effect for BladderStiffness {
 
     fn elastic_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
         let s = at.relative_contraction();
-        let beyond = s - 1.0;
-        let added = self.added_force * s * (1.0 + beyond * (self.added_growth + beyond * self.added_curvature));
+        let added = self.added_force * self.grown(s) * (1.0 + self.added_curvature * (s - 1.0).powi(2));
         force * (1.0 + self.relative_change + self.change_with_contraction * s) - added
     }
 

@@ -600,7 +600,8 @@ class SlowStart(Plant):
 
 class StifferEnd(Plant):
     def static_force(self, pressure, x, own):
-        return super().static_force(pressure, x, own) - 340 * x + 600 * x**2 - 12000 * x**3
+        fung = 30 * (np.exp(x / 0.125) - 1)
+        return super().static_force(pressure, x, own) - fung * (1 + 0.3 * (x / 0.1 - 1) ** 2)
 
 
 class WrongBore(Plant):

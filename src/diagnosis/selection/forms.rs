@@ -67,11 +67,11 @@ impl Search<'_> {
         instead.unwrap_or_else(|| if is_possible(&judged) { finished(judged) } else { refined })
     }
 
-    /// The hypothesis with the shapes at whose bounds its fit ended at their defaults, where that is possible and the odds do not ask for them: data
-    /// that do not tell a shape leave it anywhere.
+    /// The hypothesis with the shapes at whose bounds its fit ended at their defaults, or with no other refinements, where that is possible and the
+    /// odds do not ask for what is left out: data that do not tell shapes leave them anywhere.
     fn possible_instead(&self, impossible: &Judged) -> Option<Judged> {
-        let instead = self.bench.possible_instead(&impossible.fitted)?;
-        (evidence(&instead, &impossible.fitted) < LEAST_EVIDENCE).then(|| self.judge(instead))
+        let mut instead = self.bench.possible_instead(&impossible.fitted);
+        instead.find(|fit| evidence(fit, &impossible.fitted) < LEAST_EVIDENCE).map(|fit| self.judge(fit))
     }
 
     /// Whether a hypothesis explains so much less than a best one that says all that the end of its fit changes nothing.
