@@ -199,6 +199,12 @@ impl<'a> Bench<'a> {
         self.with_fewer_free(fitted, &fitted.hypothesis.refined_as(is_wanted))
     }
 
+    /// A hypothesis with one of its effects as large as it likes and its other parameters at their defaults; `None` where it cannot be simulated.
+    pub fn of_size_alone(&self, fitted: &Fitted, part: &Part) -> Option<Fitted> {
+        let others: Vec<&str> = part.freed().map(|(name, _)| *name).filter(|name| *name != part.size().0).collect();
+        self.with_fewer_free(fitted, &fitted.hypothesis.in_form_of(part.holding(&others)))
+    }
+
     /// Possible fits in the place of one that is impossible only by what ended at bounds of shapes: these at their defaults, or all other
     /// refinements, of which one may have pushed them there.
     pub fn possible_instead(&self, fitted: &Fitted) -> impl Iterator<Item = Fitted> {

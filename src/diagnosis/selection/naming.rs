@@ -101,7 +101,7 @@ impl Search<'_> {
         }
     }
 
-    /// Drops effects of several that may as well be neutral, in their plain form, too: what the odds make of them hangs on a few blocks, and is
+    /// Drops effects of several that may as well be neutral, with their size alone, too, as parameters may stand in for each other: what the odds make of them hangs on a few blocks, and is
     /// more likely the form of the others.
     fn assured(&self, judged: Judged) -> Judged {
         let Fitted { hypothesis, .. } = &judged.fitted;
@@ -109,12 +109,8 @@ impl Search<'_> {
             return judged;
         }
         let in_doubt = hypothesis.parts.iter().find(|part| {
-            let is_wanted = |name: &str| part.refinements().all(|(own, _)| *own != name);
             self.may_be_neutral(&judged.fitted, part)
-                && self
-                    .bench
-                    .less_refined(&judged.fitted, is_wanted)
-                    .is_some_and(|plain| self.may_be_neutral(&plain, part))
+                && self.bench.of_size_alone(&judged.fitted, part).is_some_and(|plain| self.may_be_neutral(&plain, part))
         });
         match in_doubt.and_then(|part| self.without(&judged, part)).filter(is_possible) {
             Some(fewer) => self.assured(fewer),
