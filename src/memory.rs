@@ -276,6 +276,11 @@ impl Slack {
         self.play == 0.0 && self.play_growth == 0.0 && self.stiction == 0.0
     }
 
+    /// Where the pilot starts under a command in V: the mean of its plays.
+    pub fn start_at(&self, command: f64) -> f64 {
+        command + self.start * (self.play + self.play_growth * command)
+    }
+
     /// Half widths at a command in V of the plays that share the pilot, V.
     fn half_widths(&self, command: f64) -> [f64; PLAYS] {
         let share = |k: usize| 1.0 + self.play_spread * (2.0 * k as f64 / (PLAYS - 1) as f64 - 1.0);
@@ -297,8 +302,7 @@ struct Pilot {
 impl Pilot {
     fn at_rest(slack: &Slack, command: f64) -> Self {
         let behind_play = slack.half_widths(command).map(|half_width| command + half_width * slack.start);
-        let stuck_at = behind_play.iter().sum::<f64>() / PLAYS as f64;
-        Self { behind_play, stuck_at, steep: 0.0, slides: 0.0 }
+        Self { behind_play, stuck_at: slack.start_at(command), steep: 0.0, slides: 0.0 }
     }
 
     /// Follows a line of the command, and tells the lines that come of it.

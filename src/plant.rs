@@ -299,6 +299,7 @@ fn effects_at_start(parameters: &Parameters, at: &Point) -> [f64; Effects::STATE
 /// Gauge pressure in Pa at which the valve comes to rest under a command in V, with a contraction in m.
 pub fn steady_pressure(parameters: &Parameters, command: f64, contraction: f64) -> f64 {
     let still = Parameters { effects: parameters.effects.at_rest(), ..*parameters };
+    let command = parameters.effects.slack().start_at(command);
     let own = effects_at_start(&still, &at_rest(0.0, contraction));
     let rate = |pressure: f64| {
         let at = with_target(&still, command, at_rest(pressure, contraction), &own);
@@ -410,8 +411,8 @@ impl System for PneumaticMuscle {
     const SCALE: Self::State = Extended(Effects::scales(&[1e5, 0.1, 0.1]));
 
     fn initial_state(parameters: &Parameters, inputs: &MuscleInputs) -> Result<Self::State> {
-        let (mass, gauge_pressure) =
-            (|contraction| masses(parameters, contraction).0, parameters.initial.gauge_pressure);
+        let gauge_pressure = parameters.initial.gauge_pressure;
+        let mass = |contraction| masses(parameters, contraction).0;
         let weight = |contraction| mass(contraction) * GRAVITY + inputs.external_force;
         let hanging = equilibrium_with(parameters, gauge_pressure, weight);
         let contraction = hanging.ok_or_else(|| Error::NoEquilibrium { mass: mass(0.0), gauge_pressure })?;

@@ -27,12 +27,6 @@ fn command(k: usize) -> f64 {
     1.6 + 0.6 * (1.9 * STEP * k.saturating_sub(AT_REST) as f64).sin()
 }
 
-/// The first command as the valve sees it, whose pilot may rest off its middle.
-fn first_seen(parameters: &Parameters) -> f64 {
-    let (slack, command) = (parameters.effects.slack(), command(0));
-    command + slack.start * (slack.play + slack.play_growth * command)
-}
-
 fn parse(text: &str) -> Recording {
     Recording::parse(text.as_bytes(), Path::new("simulated.csv"), &[]).unwrap()
 }
@@ -56,7 +50,7 @@ fn cases() -> impl Iterator<Item = (&'static Description, Parameters)> {
 fn a_hanging_load_is_replayed() {
     for (effect, mut parameters) in cases() {
         let mut text = "time [s],command [V],gauge_pressure [Pa],contraction [m],force [N],load_mass [kg]\n".to_owned();
-        parameters.initial.gauge_pressure = steady_pressure(&parameters, first_seen(&parameters), 0.05);
+        parameters.initial.gauge_pressure = steady_pressure(&parameters, command(0), 0.05);
         let mut muscle = Simulator::<PneumaticMuscle>::new(parameters);
         muscle.inputs.command = command(0);
         muscle.initialize(0.0).unwrap();
@@ -88,7 +82,7 @@ fn a_prescribed_motion_is_replayed() {
     for (effect, mut parameters) in cases().filter(|(effect, _)| !effect.of_load) {
         let header = "gauge_pressure [Pa],contraction [m],force [N]\n";
         let (mut with_command, mut without) = (format!("time [s],command [V],{header}"), format!("time [s],{header}"));
-        parameters.initial.gauge_pressure = steady_pressure(&parameters, first_seen(&parameters), motion(0.0).0);
+        parameters.initial.gauge_pressure = steady_pressure(&parameters, command(0), motion(0.0).0);
         let mut muscle = Simulator::<PneumaticActuator>::new(parameters);
         let inputs = |k: usize| {
             let (contraction, contraction_velocity) = motion(STEP * k as f64);

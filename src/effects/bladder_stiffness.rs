@@ -1,4 +1,4 @@
-use super::{Description, Effect, Holds, Point};
+use super::{Description, Effect, Holds, Point, exponential};
 
 /// Beyond these it is no tube of rubber that adds its force: a stop, or something else that begins at some contraction.
 const LEAST_GROWTH: f64 = -1.0;
@@ -40,8 +40,7 @@ crate::variables::variables! {
 impl BladderStiffness {
     /// What the tube pulls back with at a contraction in 0.1 m, relative to that at 0.1 m.
     fn grown(&self, s: f64) -> f64 {
-        // Of nearly none the differences are those of rounding.
-        if self.added_growth.abs() < 1e-6 { s } else { (self.added_growth * s).exp_m1() / self.added_growth.exp_m1() }
+        exponential(self.added_growth, s, 1.0)
     }
 }
 

@@ -62,6 +62,13 @@ fn by_curvature(value: f64, curvature: f64, middle: f64) -> f64 {
     curvature * ((value / middle).powi(2) - 1.0)
 }
 
+/// (eʳᵃ − 1)/(eʳᵇ − 1): how far an exponential of a rate r has come at a, relative to b; a straight line for none.
+fn exponential(rate: f64, at: f64, reference: f64) -> f64 {
+    // Nearer to zero the differences are those of rounding.
+    let rate = rate.abs().max(1e-6).copysign(rate);
+    (rate * at).exp_m1() / (rate * reference).exp_m1()
+}
+
 /// The value that [`scaled`] made a reading of: the root of a quadratic that is near to the reading.
 fn unscaled(reading: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
     let slope = 1.0 + relative_error - bend;

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, Readings};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, Readings, exponential};
 
 crate::variables::variables! {
     /// Something in series with the muscle that stretches: a cable, a fitting, the frame.
@@ -49,10 +49,8 @@ impl SeriesElasticity {
 
     /// Way at a pull in N, relative to that at the reference.
     fn course(&self, force: f64) -> f64 {
-        // Nearer to zero the differences are those of rounding.
-        let exponent = self.exponent.abs().max(1e-6).copysign(self.exponent);
         let grown = |force: f64| (force / self.toe_force).ln_1p();
-        (exponent * grown(force)).exp_m1() / (exponent * grown(REFERENCE_FORCE)).exp_m1()
+        exponential(self.exponent, grown(force), grown(REFERENCE_FORCE))
     }
 }
 

@@ -28,6 +28,9 @@ class Plant:
     lifted = 0.0
     start_velocity = 0.0
 
+    def weight(self, x):
+        return (self.weighing + self.lifted * x) * GRAVITY
+
     def own_start(self, x):
         return []
 
@@ -827,7 +830,7 @@ CASES = [
 def start(case):
     """The load hangs in balance at the pressure that the first command asks for."""
     pressure, plant = VALVE_GAIN * case.command[0], case.plant
-    surplus = lambda x: plant.force(pressure, x, plant.start_velocity, plant.own_start(x)) - (plant.weighing + plant.lifted * x) * GRAVITY
+    surplus = lambda x: plant.force(pressure, x, plant.start_velocity, plant.own_start(x)) - plant.weight(x)
     x = brentq(surplus, 0.0, 0.22, xtol=1e-15, rtol=1e-15)
     return np.array([pressure, x, plant.start_velocity, *plant.own_start(x)])
 
@@ -843,8 +846,7 @@ def solve(case):
     def derivative(t, state, t0, value, slope):
         pressure, x, velocity, *own = state
         target = VALVE_GAIN * (value + slope * (t - t0))
-        weight = (plant.weighing + plant.lifted * x) * GRAVITY
-        push = (plant.force(pressure, x, velocity, own) - weight) / (plant.moving + plant.lifted * x)
+        push = (plant.force(pressure, x, velocity, own) - plant.weight(x)) / (plant.moving + plant.lifted * x)
         own_rates = plant.own_rates(target, pressure, x, velocity, own)
         return [plant.rate(target, pressure, x, velocity, own), velocity, push, *own_rates]
 

@@ -101,8 +101,8 @@ impl Search<'_> {
         }
     }
 
-    /// Drops effects of several that may as well be neutral, with their size alone, too, as parameters may stand in for each other: what the odds make of them hangs on a few blocks, and is
-    /// more likely the form of the others.
+    /// Drops effects of several that may as well be neutral, with their size alone, too, as parameters may stand in for each other: what the
+    /// odds make of them hangs on a few blocks, and is more likely the form of the others.
     fn assured(&self, judged: Judged) -> Judged {
         let Fitted { hypothesis, .. } = &judged.fitted;
         if hypothesis.parts.len() < 2 {
