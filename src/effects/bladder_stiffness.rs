@@ -76,6 +76,9 @@ impl Effect for BladderStiffness {
     }
 
     fn elastic_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
+        if self.is_neutral() {
+            return force;
+        }
         let s = at.relative_contraction();
         let added = self.added_force * self.grown(s) * (1.0 + self.added_curvature * (s - 1.0).powi(2));
         force * (1.0 + self.relative_change + self.change_with_contraction * s) - added

@@ -86,6 +86,9 @@ impl Effect for ForceGain {
     }
 
     fn static_force(&self, force: f64) -> f64 {
+        if self.is_neutral() {
+            return force;
+        }
         scaled(force, self.error() + by_curvature(force, self.curvature, REFERENCE_FORCE), self.bend, REFERENCE_FORCE)
     }
 

@@ -169,6 +169,9 @@ impl Effect for TemperatureDrift {
     }
 
     fn readings(&self, readings: Readings) -> Readings {
+        if self.force_zero == 0.0 && self.pressure_zero == 0.0 {
+            return readings;
+        }
         let warmth = self.warmth_of_sensor(readings.time);
         Readings {
             force: readings.force + self.force_zero * warmth,

@@ -269,11 +269,14 @@ impl<'a> Search<'a> {
     fn next_level(&self, level: &[Judged]) -> Vec<Judged> {
         let mut bases = carried_on(level);
         // What forms may leave is looked into only where the best leaves it.
-        if level.first().is_some_and(|best| self.may_be_form(&best.fitted.losses)) {
+        let is_form_alone = level.first().is_some_and(|best| self.may_be_form(&best.fitted.losses));
+        if is_form_alone {
             bases.truncate(1);
         }
-        let more = bases.into_iter().flat_map(|rank| self.extend(&level[rank].fitted, rank == 0, &self.from)).collect();
-        let mut next = self.worth_refining(level, more);
+        let mut next = self.extended(level, &bases);
+        if next.is_empty() && effects_of(level) == 1 && !is_form_alone {
+            next = self.extended(level, &not_carried_on(level, &bases));
+        }
         let mut exchanged_in: Vec<Vec<&str>> = Vec::new();
         while let Some(best) = possible(&next).or(next.first()) {
             let names = best.fitted.hypothesis.names();
@@ -288,26 +291,37 @@ impl<'a> Search<'a> {
         next
     }
 
+    /// The hypotheses of some ranks of a level with one effect more, as far as they may be worth it.
+    fn extended(&self, level: &[Judged], ranks: &[usize]) -> Vec<Judged> {
+        let more = ranks.iter().flat_map(|&rank| self.extend(&level[rank].fitted, rank == 0, &self.from));
+        self.worth_refining(level, more.collect())
+    }
+
     /// Hypotheses with effects of the best exchanged for others, those that are `known` to be as good in another form left out.
     ///
     /// Where the best leaves more than forms may, the earlier effects are exchanged, beside what the rest is without them: alone, a wrong one
-    /// may have looked better. Where it does not, and is worth one effect more than a level has, all are, beside what the rest is with
-    /// them: what does the same there may not have been found from elsewhere.
+    /// may have looked better. So is the last one, from all its starts beside what the rest is with it: it may have been found beside an
+    /// earlier one that was in a poor form yet. Where the best leaves no more than that, and is worth one effect more than a level has, all are
+    /// exchanged, beside what the rest is with them: what does the same there may not have been found from elsewhere.
     fn exchanged(&self, level: &[Judged], known: &[Judged], best: &Judged) -> Vec<Judged> {
         let parts = &best.fitted.hypothesis.parts;
-        let without: Vec<(&Part, Fitted)> = if !self.may_be_form(&best.fitted.losses) {
-            let earlier = parts.split_last().map_or(&[][..], |(_, earlier)| earlier);
-            earlier.iter().filter_map(|part| Some((part, self.without(best, part)?.fitted))).collect()
+        let leaves_much = !self.may_be_form(&best.fitted.losses);
+        let beside = |part: Part| Some((part, self.bench.neutralised(&best.fitted, part.effect)?));
+        let without = |part: Part| Some((part, self.without(best, &part)?.fitted));
+        let Some((last, earlier)) = parts.split_last() else { return Vec::new() };
+        let bases: Vec<(Part, Fitted)> = if leaves_much {
+            earlier.iter().copied().filter_map(without).chain(beside(*last)).collect()
         } else if possible(level).is_some_and(|fewer| self.is_worth(fewer, best)) {
-            parts.iter().filter_map(|part| Some((part, self.bench.neutralised(&best.fitted, part.effect)?))).collect()
+            parts.iter().copied().filter_map(beside).collect()
         } else {
             Vec::new()
         };
-        let exchange = |(part, base): &(&Part, Fitted)| {
+        let exchange = |(part, base): &(Part, Fitted)| {
             let others = self.from.iter().copied().filter(|(other, _)| other.effect.name != part.effect.name);
-            self.extend(base, false, &others.collect::<Vec<_>>())
+            let leads = leaves_much && part.effect.name == last.effect.name;
+            self.extend(base, leads, &others.collect::<Vec<_>>())
         };
-        let mut exchanged: Vec<Judged> = without.iter().flat_map(exchange).collect();
+        let mut exchanged: Vec<Judged> = bases.iter().flat_map(exchange).collect();
         exchanged.retain(|other| !known.iter().any(|known| same_effects(known, other) && known.score >= other.score));
         self.worth_refining(level, exchanged)
     }
@@ -442,6 +456,12 @@ fn carried_on(level: &[Judged]) -> Vec<usize> {
     chosen.sort_unstable();
     chosen.dedup();
     chosen
+}
+
+/// The others of which one may be a cause. Where two effects hide each other, either may be found beside one of them only, and that need not
+/// look good alone.
+fn not_carried_on(level: &[Judged], carried_on: &[usize]) -> Vec<usize> {
+    (0..level.len()).filter(|rank| !carried_on.contains(rank) && level[*rank].evidence > LEAST_EVIDENCE).collect()
 }
 
 fn sorted(mut judged: Vec<Judged>) -> Vec<Judged> {
