@@ -178,16 +178,21 @@ fn root(function: impl Fn(f64) -> f64, at_zero: f64, guess: f64, bound: f64, sma
     let (mut near, mut value_near) = (0.0, at_zero);
     let (mut far, mut value_far) = (bound, -at_zero);
     let mut now = guess;
+    let mut was_near = None;
     for _ in 0..MOST_STEPS {
         let value = function(now);
         if value.abs() <= small {
             break;
         }
-        if value * at_zero > 0.0 {
-            (near, value_near, value_far) = (now, value, 0.5 * value_far);
+        // An end that stays twice counts half, since else it would stay for ever.
+        let is_near = value * at_zero > 0.0;
+        let stays = if was_near == Some(is_near) { 0.5 } else { 1.0 };
+        if is_near {
+            (near, value_near, value_far) = (now, value, stays * value_far);
         } else {
-            (far, value_far, value_near) = (now, value, 0.5 * value_near);
+            (far, value_far, value_near) = (now, value, stays * value_near);
         }
+        was_near = Some(is_near);
         let next = near - value_near * (far - near) / (value_far - value_near);
         if next == now {
             break;
