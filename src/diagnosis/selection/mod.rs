@@ -458,8 +458,8 @@ fn carried_on(level: &[Judged]) -> Vec<usize> {
     chosen
 }
 
-/// The others of which one may be a cause. Where two effects hide each other, either may be found beside one of them only, and that need not
-/// look good alone.
+/// Ranks of the others that have the odds. Where two effects hide each other, the second may be found beside one of them only, and that one
+/// need not look good alone.
 fn not_carried_on(level: &[Judged], carried_on: &[usize]) -> Vec<usize> {
     (0..level.len()).filter(|rank| !carried_on.contains(rank) && level[*rank].evidence > LEAST_EVIDENCE).collect()
 }
