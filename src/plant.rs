@@ -22,9 +22,9 @@ const SOURCE: &str = "Master thesis \u{201c}Comparative Assessment and Improveme
 
 /// Stiffness of what stretches, times this time in s, is how it damps: without mass and loss it would be infinitely fast.
 const LOSS_TIME: f64 = 5e-4;
-/// The same of something stiff, together with the damping of the muscle: at 1 kN/s that is less than 0.02 mm off, and a shorter time would
+/// The same of something stiff, together with the damping of the muscle: at 1 kN/s that is less than 0.03 mm off, and a shorter time would
 /// take the smaller steps.
-const FOLLOWING_TIME: f64 = 2e-3;
+const FOLLOWING_TIME: f64 = 3e-3;
 /// Pull in N from which on it does: where it becomes slack, nothing jumps.
 const TAUT: f64 = 10.0;
 /// Slack in m that is more than any muscle is long.
@@ -122,19 +122,18 @@ fn of_muscle(parameters: &Parameters, at: Point, own: &[f64]) -> Point {
 /// The same with the pull, behind something that stretches: it gives way at such a rate that the pull of the muscle, which moves along,
 /// is the one that it passes on. A `tension` below zero says how slack it is.
 fn stretched(parameters: &Parameters, at: &Point, own: &[f64], tension: f64) -> (Point, f64) {
-    let stretch = |tension: f64| parameters.effects.stretch(tension);
-    let difference = 1e-4 * (1.0 + tension.abs());
-    let compliance = (stretch(tension + difference) - stretch(tension - difference)) / (2.0 * difference);
+    let (stretch, compliance) = parameters.effects.stretch(tension);
+    let still = Point { contraction: at.contraction + stretch, ..*at };
     let point = |tension_rate: f64| Point {
-        contraction: at.contraction + stretch(tension),
         contraction_velocity: at.contraction_velocity + compliance * tension_rate,
         tension_rate,
-        ..*at
+        ..still
     };
+    let pull = StaticPull::at(parameters, &still, own);
     let loss_time = LOSS_TIME.max(FOLLOWING_TIME - compliance * parameters.muscle.damping);
     let loss = loss_time * (tension / TAUT).clamp(0.0, 1.0);
     let passed_on = |rate: f64| tension.max(0.0) + loss * rate;
-    let of_muscle = |rate: f64| muscle_force(parameters, &point(rate), own) - LEAST_DAMPING * compliance * rate;
+    let of_muscle = |rate: f64| pull.moving(parameters, &point(rate), own) - LEAST_DAMPING * compliance * rate;
     let lack = |rate: f64| of_muscle(rate) - passed_on(rate);
     // What damps the muscle is nominal, and else no less than nothing.
     let (at_rest, least) = (lack(0.0), loss + compliance * LEAST_DAMPING);
@@ -147,18 +146,19 @@ fn stretched(parameters: &Parameters, at: &Point, own: &[f64], tension: f64) -> 
 /// effects as they are at the start.
 fn resting_tension(parameters: &Parameters, at: &Point) -> f64 {
     let effects = &parameters.effects;
+    let stretch = |tension: f64| effects.stretch(tension).0;
     let pull = |contraction: f64| {
         let at = with_pull(parameters, &Point { contraction, ..*at });
         muscle_force(parameters, &at, &effects.start(&at))
     };
     let rigid = pull(at.contraction);
-    if effects.stretch(rigid) == 0.0 {
+    if stretch(rigid) == 0.0 {
         return rigid;
     }
-    let stretched = |tension: f64| pull(at.contraction + effects.stretch(tension));
+    let stretched = |tension: f64| pull(at.contraction + stretch(tension));
     if rigid < 0.0 {
         // The muscle would push: it is as long as it is without a load.
-        return bisect(stretched, MOST_SLACK / effects.stretch(-1.0), 0.0);
+        return bisect(stretched, MOST_SLACK / stretch(-1.0), 0.0);
     }
     root(|tension| stretched(tension) - tension, rigid, rigid, 10.0 * rigid, SAME_FORCE * (1.0 + rigid))
 }
@@ -166,7 +166,7 @@ fn resting_tension(parameters: &Parameters, at: &Point) -> f64 {
 /// Pull in N on a load at rest.
 fn resting_pull(parameters: &Parameters, at: &Point) -> f64 {
     let tension = resting_tension(parameters, at);
-    if parameters.effects.stretch(tension) == 0.0 { tension } else { tension.max(0.0) }
+    if parameters.effects.stretch(tension).0 == 0.0 { tension } else { tension.max(0.0) }
 }
 
 /// The root of a function that falls, between zero, its value at which is given, and a bound of the same sign; from a guess to where the
@@ -205,17 +205,40 @@ fn root(function: impl Fn(f64) -> f64, at_zero: f64, guess: f64, bound: f64, sma
 /// Pull of the muscle in N at its own point, with damping, effects and correction; `own` are the states of the effects.
 #[inline]
 fn muscle_force(parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
-    let Parameters { muscle, force_models, effects, unknown_cause, .. } = parameters;
-    let pressure = effects.effective_pressure(at, at.gauge_pressure);
-    let contraction = effects.effective_contraction(at, own, at.contraction);
-    let of_area = effects.area_force(at, own, force_models.pressure_force(muscle, pressure, contraction));
-    let of_membrane = effects.elastic_contraction(at, own, contraction);
-    let elastic = effects.elastic_force(at, own, force_models.elastic_force(muscle, of_membrane));
-    let static_force = effects.static_force(of_area + elastic);
-    let velocity = at.contraction_velocity;
-    let resistance = force_models.resistance(muscle, pressure, contraction, velocity);
-    let force = effects.muscle_force(at, own, static_force - muscle.damping * velocity - resistance);
-    unknown_cause.force(at, force)
+    StaticPull::at(parameters, at, own).moving(parameters, at, own)
+}
+
+/// What of the pull of a muscle does not depend on how fast it moves.
+struct StaticPull {
+    /// Gauge pressure that the muscle feels, Pa.
+    pressure: f64,
+    /// Contraction that it feels, m.
+    contraction: f64,
+    /// Pull in N.
+    force: f64,
+}
+
+impl StaticPull {
+    #[inline]
+    fn at(parameters: &Parameters, at: &Point, own: &[f64]) -> Self {
+        let Parameters { muscle, force_models, effects, .. } = parameters;
+        let pressure = effects.effective_pressure(at, at.gauge_pressure);
+        let contraction = effects.effective_contraction(at, own, at.contraction);
+        let of_area = effects.area_force(at, own, force_models.pressure_force(muscle, pressure, contraction));
+        let of_membrane = effects.elastic_contraction(at, own, contraction);
+        let elastic = effects.elastic_force(at, own, force_models.elastic_force(muscle, of_membrane));
+        Self { pressure, contraction, force: effects.static_force(of_area + elastic) }
+    }
+
+    /// The whole pull in N at the point's velocity.
+    #[inline]
+    fn moving(&self, parameters: &Parameters, at: &Point, own: &[f64]) -> f64 {
+        let Parameters { muscle, force_models, effects, unknown_cause, .. } = parameters;
+        let velocity = at.contraction_velocity;
+        let resistance = force_models.resistance(muscle, self.pressure, self.contraction, velocity);
+        let force = effects.muscle_force(at, own, self.force - muscle.damping * velocity - resistance);
+        unknown_cause.force(at, force)
+    }
 }
 
 /// Pull of the muscle in N without effects.
@@ -297,7 +320,7 @@ fn with_pull(parameters: &Parameters, at: &Point) -> Point {
 /// States of the effects at the start, at the point of a load at rest or one that moves evenly.
 fn effects_at_start(parameters: &Parameters, at: &Point) -> [f64; Effects::STATES] {
     let tension = resting_tension(parameters, at);
-    let contraction = at.contraction + parameters.effects.stretch(tension);
+    let contraction = at.contraction + parameters.effects.stretch(tension).0;
     parameters.effects.start(&with_pull(parameters, &Point { contraction, tension, ..*at }))
 }
 

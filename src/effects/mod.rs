@@ -64,9 +64,13 @@ fn by_curvature(value: f64, curvature: f64, middle: f64) -> f64 {
 
 /// (eʳᵃ − 1)/(eʳᵇ − 1): how far an exponential of a rate r has come at a, relative to b; a straight line for none.
 fn exponential(rate: f64, at: f64, reference: f64) -> f64 {
-    // Nearer to zero the differences are those of rounding.
-    let rate = rate.abs().max(1e-6).copysign(rate);
+    let rate = not_zero(rate);
     (rate * at).exp_m1() / (rate * reference).exp_m1()
+}
+
+/// The rate of an exponential: nearer to zero the differences from one are those of rounding.
+fn not_zero(rate: f64) -> f64 {
+    rate.abs().max(1e-6).copysign(rate)
 }
 
 /// The value that [`scaled`] made a reading of: the root of a quadratic that is near to the reading.
@@ -253,6 +257,8 @@ pub trait Effect: Declared + Default {
         rate
     }
 
+    // From here to the static force nothing may depend on the velocity: what a cable's end finds is how the muscle's loss does.
+
     /// Gauge pressure in Pa that drives the muscle.
     fn effective_pressure(&self, _at: &Point, pressure: f64) -> f64 {
         pressure
@@ -277,6 +283,7 @@ pub trait Effect: Declared + Default {
     fn static_force(&self, force: f64) -> f64 {
         force
     }
+
     /// Pull of the muscle in N.
     fn muscle_force(&self, _at: &Point, _own: &[f64], force: f64) -> f64 {
         force
@@ -285,9 +292,9 @@ pub trait Effect: Declared + Default {
     fn tension(&self, _own: &[f64]) -> Option<f64> {
         None
     }
-    /// Length in m by which what is between muscle and load stretches under a tension in N.
-    fn stretch(&self, _tension: f64) -> f64 {
-        0.0
+    /// Length in m by which what is between muscle and load stretches under a tension in N, and by how much more per N.
+    fn stretch(&self, _tension: f64) -> (f64, f64) {
+        (0.0, 0.0)
     }
     /// Mass in kg that weighs at a contraction in m.
     fn mass(&self, mass: f64, _contraction: f64) -> f64 {
@@ -576,10 +583,16 @@ macro_rules! effects {
                 None
             }
 
-            /// Length in m by which what is between muscle and load stretches under a tension in N.
+            /// Length in m by which what is between muscle and load stretches under a tension in N, and by how much more per N.
             #[inline]
-            pub fn stretch(&self, tension: f64) -> f64 {
-                0.0 $(+ self.$field.stretch(tension))*
+            pub fn stretch(&self, tension: f64) -> (f64, f64) {
+                let (mut length, mut compliance) = (0.0, 0.0);
+                $(
+                    let (stretch, more) = self.$field.stretch(tension);
+                    length += stretch;
+                    compliance += more;
+                )*
+                (length, compliance)
             }
 
             /// Masses in kg of a load that weigh and that move at a contraction in m, in this order, where one was entered.

@@ -1,4 +1,4 @@
-use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, Readings, exponential};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, Readings, not_zero};
 
 crate::variables::variables! {
     /// Something in series with the muscle that stretches: a cable, a fitting, the frame.
@@ -16,7 +16,7 @@ crate::variables::variables! {
     ///
     /// # Validity
     /// A cable without mass that pulls and does not push, but for a millisecond in which it goes slack. It loses as much as a damper of
-    /// 0.5 ms times its stiffness, or, where that is more, of 2 ms times its stiffness less the nominal damping of the muscle. The
+    /// 0.5 ms times its stiffness, or, where that is more, of 3 ms times its stiffness less the nominal damping of the muscle. The
     /// muscle moves by itself: its damping, friction and creep are of its own contraction. 10⁵ to 10⁶ N/m are usual stiffnesses.
     ///
     /// # Reference
@@ -39,18 +39,22 @@ const NEARLY_SLACK: f64 = 1.0;
 const MOST_TOE: f64 = 5e3;
 
 impl SeriesElasticity {
-    /// Way in m that gives way at a pull in N, for a compliance in m/N.
-    fn way(&self, compliance: f64, force: f64) -> f64 {
+    /// Way in m that gives way at a pull in N, for a compliance in m/N, and how much more it gives way per N there.
+    fn way(&self, compliance: f64, force: f64) -> (f64, f64) {
         if self.exponent == 1.0 || compliance == 0.0 {
-            return compliance * force;
+            return (compliance * force, compliance);
         }
-        compliance * REFERENCE_FORCE * self.course(force.max(0.0))
+        let whole = compliance * REFERENCE_FORCE;
+        let (course, slope) = self.course(force.max(0.0));
+        (whole * course, whole * slope)
     }
 
-    /// Way at a pull in N, relative to that at the reference.
-    fn course(&self, force: f64) -> f64 {
-        let grown = |force: f64| (force / self.toe_force).ln_1p();
-        exponential(self.exponent, grown(force), grown(REFERENCE_FORCE))
+    /// Way at a pull in N relative to that at the reference, and its slope in 1/N.
+    fn course(&self, force: f64) -> (f64, f64) {
+        let exponent = not_zero(self.exponent);
+        let grown = |force: f64| (exponent * (force / self.toe_force).ln_1p()).exp_m1();
+        let (here, whole) = (grown(force), grown(REFERENCE_FORCE));
+        (here / whole, exponent * (1.0 + here) / (whole * (self.toe_force + force)))
     }
 }
 
@@ -82,8 +86,8 @@ impl Effect for SeriesElasticity {
         refinements: &[("series_elasticity.exponent", &[0.8]), ("series_elasticity.toe_force", &[100.0])],
     };
 
-    /// Tension of what stretches between muscle and load.
-    const STATE_SCALES: &'static [f64] = &[10.0];
+    /// Tension of what stretches between muscle and load: at 10⁵ N/m it moves the load by the contraction's scale.
+    const STATE_SCALES: &'static [f64] = &[1e4];
 
     fn is_neutral(&self) -> bool {
         self.compliance == 0.0 && self.load_compliance == 0.0
@@ -109,21 +113,24 @@ impl Effect for SeriesElasticity {
         (!self.rests()).then(|| own[0])
     }
 
-    fn stretch(&self, tension: f64) -> f64 {
-        let way = |tension: f64| self.way(self.load_compliance, tension);
-        if tension < NEARLY_SLACK { way(NEARLY_SLACK) * tension / NEARLY_SLACK } else { way(tension) }
+    fn stretch(&self, tension: f64) -> (f64, f64) {
+        if tension >= NEARLY_SLACK {
+            return self.way(self.load_compliance, tension);
+        }
+        let compliance = self.way(self.load_compliance, NEARLY_SLACK).0 / NEARLY_SLACK;
+        (compliance * tension, compliance)
     }
 
     fn readings(&self, readings: Readings) -> Readings {
-        Readings { contraction: readings.contraction + self.way(self.compliance, readings.force), ..readings }
+        Readings { contraction: readings.contraction + self.way(self.compliance, readings.force).0, ..readings }
     }
 
     fn true_contraction(&self, reading: f64, force: f64, _time: f64) -> f64 {
-        reading - self.way(self.compliance, force)
+        reading - self.way(self.compliance, force).0
     }
 
     fn sentence(&self) -> String {
-        let millimetres = |compliance: f64| 1e3 * self.way(compliance, REFERENCE_FORCE);
+        let millimetres = |compliance: f64| 1e3 * self.way(compliance, REFERENCE_FORCE).0;
         if self.load_compliance != 0.0 {
             let stretch = millimetres(self.load_compliance);
             return format!(

@@ -677,9 +677,9 @@ class Rope(Plant):
 
 
 class Wire(Rope):
-    """Stiffness over damping leaves the muscle 2 ms to follow."""
+    """Stiffness over damping leaves the muscle 3 ms to follow."""
 
-    stiffness, damper = 2e5, 2e5 * 2e-3 - DAMPING
+    stiffness, damper = 2e5, 2e5 * 3e-3 - DAMPING
 
 
 class SeriesElasticity(Plant):
