@@ -25,17 +25,18 @@ pub struct Course {
     pub settling: (f64, f64),
     /// Amplitude by which it swings, period in s and phase in rad at the start.
     pub swing: (f64, f64, f64),
-    /// By how much it shifts once and for all, time in s of the middle of that, and how long in s it takes.
-    pub shift: (f64, f64, f64),
+    /// By how much it shifts once and for all in each recording, time in s of the middle of that, and how long in s it takes.
+    pub shifts: ([f64; 3], f64, f64),
 }
 
 impl Course {
-    /// o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + j times how far a ramp over d around t_j has come; before the start as there.
+    /// o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + the j of earlier recordings + j_k times how far a ramp over d around t_j has come; before the
+    /// start as there.
+    #[inline]
     pub fn at(&self, time: f64) -> f64 {
         let time = time.max(0.0);
         let (settling, constant) = self.settling;
         let (swing, period, phase) = self.swing;
-        let (shift, middle, lasts) = self.shift;
         let mut zero = self.offset + of_recording(self.recording, self.anew);
         if settling != 0.0 {
             zero += settling * (-time / constant).exp();
@@ -43,15 +44,28 @@ impl Course {
         if swing != 0.0 {
             zero += swing * (TAU * time / period + phase).sin();
         }
-        if shift != 0.0 {
-            zero += shift * ((time - middle) / lasts + 0.5).clamp(0.0, 1.0);
+        if self.shifts() {
+            zero += self.shifted(time);
         }
         zero
     }
 
+    /// By how much it has shifted.
+    fn shifted(&self, time: f64) -> f64 {
+        let ([first, second, third], middle, lasts) = self.shifts;
+        let before = of_recording(self.recording, [first, first + second]);
+        let now = first + of_recording(self.recording, [second - first, third - first]);
+        before + now * ((time - middle) / lasts + 0.5).clamp(0.0, 1.0)
+    }
+
     /// Whether it stays where it is.
     pub fn is_constant(&self) -> bool {
-        self.settling.0 == 0.0 && self.swing.0 == 0.0 && self.shift.0 == 0.0
+        self.settling.0 == 0.0 && self.swing.0 == 0.0 && !self.shifts()
+    }
+
+    /// Whether it shifts in any recording.
+    fn shifts(&self) -> bool {
+        self.shifts.0 != [0.0; 3]
     }
 
     /// Whether it is always right.
@@ -63,7 +77,8 @@ impl Course {
     pub fn is_plausible(&self) -> bool {
         let ((settling, constant), (swing, period, _)) = (self.settling, self.swing);
         let [second, third] = self.anew;
-        let are_inside = [settling, swing, self.shift.0, second, third].iter().all(|part| part.abs() < self.most);
+        let are_inside =
+            [settling, swing, second, third].iter().chain(&self.shifts.0).all(|part| part.abs() < self.most);
         let settles_slowly = settling == 0.0 || constant > FASTEST_SETTLING;
         are_inside && settles_slowly && (swing == 0.0 || (period > FASTEST && period < SLOWEST))
     }
@@ -72,7 +87,7 @@ impl Course {
     pub fn told(&self, amount: impl Fn(f64) -> String) -> String {
         let (settling, constant) = self.settling;
         let (swing, period, _) = self.swing;
-        let (shift, middle, _) = self.shift;
+        let (shifts, middle, _) = self.shifts;
         let shows = |value: f64| amount(value).contains(|digit: char| ('1'..='9').contains(&digit));
         let anew = |own, recording: &str| format!(", {} in the {recording} recording", amount(self.offset + own));
         let mut told =
@@ -84,8 +99,10 @@ impl Course {
             let either_way = amount(swing).replace('+', "±");
             let _ = write!(told, ", swinging by {either_way} with a period of {period:.0} s");
         }
-        if shows(shift) {
-            let _ = write!(told, ", shifted by {} from {middle:.1} s on", amount(shift));
+        for (shift, recording) in shifts.into_iter().zip(["", " of the second recording", " of the third recording"]) {
+            if shows(shift) {
+                let _ = write!(told, ", shifted by {} from {middle:.1} s{recording} on", amount(shift));
+            }
         }
         told
     }
@@ -121,8 +138,12 @@ macro_rules! zero {
                 swing_period: f64 = 30.0, SECOND, ($crate::zero::FASTEST..=$crate::zero::SLOWEST);
                 /// Phase of the swing at the start, in rad
                 swing_phase: f64 = 0.0, ONE, (-10.0..=10.0);
-                /// By how much the offset shifts once, as after a shock
+                /// By how much the offset shifts once, as after a shock, in the first of several recordings
                 shift: f64 = 0.0, $unit, (-$most..=$most);
+                /// By how much it shifts in the second
+                second_shift: f64 = 0.0, $unit, (-$most..=$most);
+                /// By how much it shifts in the third
+                third_shift: f64 = 0.0, $unit, (-$most..=$most);
                 /// When it shifts: the middle of the shift
                 shift_time: f64 = 10.0, SECOND, (0.0..=10000.0);
                 /// How long the shift takes
@@ -154,6 +175,18 @@ macro_rules! zero {
                     (concat!($prefix, "shift_time"), $crate::zero::TIMES),
                     (concat!($prefix, "shift_span"), &[2.0]),
                 ],
+                &[
+                    (concat!($prefix, "offset"), &[$size]),
+                    (concat!($prefix, "second_shift"), &$crate::zero::either_way(0.2 * $size)),
+                    (concat!($prefix, "shift_time"), $crate::zero::TIMES),
+                    (concat!($prefix, "shift_span"), &[2.0]),
+                ],
+                &[
+                    (concat!($prefix, "offset"), &[$size]),
+                    (concat!($prefix, "third_shift"), &$crate::zero::either_way(0.2 * $size)),
+                    (concat!($prefix, "shift_time"), $crate::zero::TIMES),
+                    (concat!($prefix, "shift_span"), &[2.0]),
+                ],
             ];
             const REFINEMENTS: &'static [$crate::effects::Freed] =
                 &[(concat!($prefix, "settling"), &[0.3 * $size]), (concat!($prefix, "settling_time"), &[5.0])];
@@ -166,7 +199,7 @@ macro_rules! zero {
                     recording: self.recording,
                     settling: (self.settling, self.settling_time),
                     swing: (self.swing, self.swing_period, self.swing_phase),
-                    shift: (self.shift, self.shift_time, self.shift_span),
+                    shifts: ([self.shift, self.second_shift, self.third_shift], self.shift_time, self.shift_span),
                 }
             }
         }
@@ -184,4 +217,27 @@ pub(crate) const TIMES: &[f64] =
 /// A shift up and one down for each of these times.
 pub(crate) const fn either_way(size: f64) -> [f64; TIMES.len()] {
     each_for(&[size, -size], 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_shifted_stays_so_in_the_recordings_that_follow() {
+        let course = |recording, shifts| Course {
+            most: 1.0,
+            offset: 0.5,
+            anew: [0.0; 2],
+            recording,
+            settling: (0.0, 1.0),
+            swing: (0.0, 1.0, 0.0),
+            shifts: (shifts, 3.0, 0.1),
+        };
+        let ends = |recording, shifts| [0.0, 9.0].map(|time| course(recording, shifts).at(time));
+        let each = |shifts| [1.0, 2.0, 3.0].map(|recording| ends(recording, shifts));
+        assert_eq!(each([0.25, 0.0, 0.0]), [[0.5, 0.75], [0.75, 0.75], [0.75, 0.75]]);
+        assert_eq!(each([0.0, 0.25, 0.0]), [[0.5, 0.5], [0.5, 0.75], [0.75, 0.75]]);
+        assert_eq!(each([0.0, 0.0, -0.25]), [[0.5, 0.5], [0.5, 0.5], [0.5, 0.25]]);
+    }
 }

@@ -183,6 +183,7 @@ fn effects_agree_with_scipy() {
             "rounded_ports",
             &[("valve_dead_band.pressure_overlap", 6e3), ("valve_dead_band.overlap_rounding", 2.0 / 3.0)],
         ),
+        ("resting_regulator", &[("valve_dead_band.waking", 8e3)]),
         (
             "thinning_damping",
             &[

@@ -140,8 +140,8 @@ impl Part {
 /// How many recordings there must be for a parameter to mean anything: some hold in the second or in the third alone.
 pub fn recordings_for(name: &str) -> usize {
     match name.split('.').next_back() {
-        Some("second" | "second_phase" | "second_start") => 2,
-        Some("third" | "third_phase" | "third_start") => 3,
+        Some("second" | "second_phase" | "second_start" | "second_shift") => 2,
+        Some("third" | "third_phase" | "third_start" | "third_shift") => 3,
         _ => 1,
     }
 }

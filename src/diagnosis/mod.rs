@@ -261,7 +261,8 @@ fn unlisted(bench: &Bench, chosen: &Chosen) -> Option<Remaining> {
 
 /// How to simulate another recording than the first with causes that have values of their own there.
 fn of_several(chosen: &Chosen, recordings: &[Recording]) -> Option<String> {
-    let differ = |part: &&Part| part.freed().any(|(name, _)| recordings_for(name) > 1);
+    let is_of_one = |name: &str| recordings_for(name) > 1 || recordings.len() > 1 && name.ends_with(".shift");
+    let differ = |part: &&Part| part.freed().any(|(name, _)| is_of_one(name));
     let numbers = chosen.model.hypothesis.parts.iter().filter(differ);
     let numbers: Vec<_> = numbers.map(|part| format!("`{}.recording`", part.effect.name)).collect();
     let names: Vec<_> =

@@ -6,7 +6,7 @@ use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality::correlation;
 use crate::quality::sensors::resolution;
-use crate::simulation::{OUTPUTS, Replay, replay, replay_within, start_deviation};
+use crate::simulation::{OUTPUTS, Replay, in_recording, replay, replay_within, start_deviation};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -423,16 +423,19 @@ impl<'a> Data<'a> {
         Some(all)
     }
 
-    /// Whether a course over the time in s since the start cannot be told from what drives the muscle: in every recording the
-    /// command, or the pressure where that is not there, has most of its variance in common with it.
-    pub fn goes_with_inputs(&self, course: impl Fn(f64) -> f64) -> bool {
-        self.recordings.iter().all(|recording| {
-            let Some(input) = recording.get(Signal::Command).or_else(|| recording.get(Signal::GaugePressure)) else {
-                return false;
-            };
-            let course: Vec<f64> = recording.time.iter().map(|time| course(time - recording.time[0])).collect();
-            correlation(&course, input).powi(2) > MOST_OF_VARIANCE
-        })
+    /// Whether what an effect of a model does over time by itself cannot be told from what drives the muscle: in every recording in which
+    /// it does anything, the command, or the pressure where that is not there, has most of its variance in common with it.
+    pub fn goes_with_inputs(&self, model: &Parameters, effect: &str) -> bool {
+        let goes = |recording: &Recording| {
+            let effects = in_recording(model, recording).effects;
+            let own = recording.time.iter().map(|time| effects.own_course(effect, time - recording.time[0]));
+            let course: Vec<f64> = own.collect();
+            let input = recording.get(Signal::Command).or_else(|| recording.get(Signal::GaugePressure));
+            let is_driven = |input: &[f64]| correlation(&course, input).powi(2) > MOST_OF_VARIANCE;
+            course.iter().any(|value| *value != course[0]).then(|| input.is_some_and(is_driven))
+        };
+        let each: Vec<bool> = self.recordings.iter().filter_map(goes).collect();
+        !each.is_empty() && each.into_iter().all(|goes| goes)
     }
 
     /// The recordings.

@@ -6,15 +6,15 @@ zero! {
     ///
     /// # Model
     /// x_measured ← x_measured + o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `second` and `third` o_k in recording k, `settling` s,
-    /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
-    /// `shift_span` around `shift_time`.
+    /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j, `second_shift` and `third_shift` in these recordings, in those
+    /// that follow all of it; r goes from 0 to 1 within `shift_span` around `shift_time`.
     ///
     /// # In the data
     /// A constant residual of the contraction, also at rest. Without it in the force, it is not a change of the muscle.
     ///
     /// # Validity
     /// Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
-    /// once by a shock; in every recording alike, from its start, but for a constant that may be another one in each of up to three.
+    /// once by a shock in one of up to three recordings, at the same time where in several; else in every recording alike, from its start, but for a constant that may be another one in each.
     ///
     /// # Reference
     /// Definition of an offset.

@@ -14,7 +14,8 @@ crate::variables::variables! {
     /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
     /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
     /// opens the more abruptly. Rounded edges let |e| − h set in gradually, about a share of h around it: `overlap_rounding`. The port for
-    /// emptying may have another overlap, h (1 + a): `emptying_excess` a. All three may be there, in this order.
+    /// emptying may have another overlap, h (1 + a): `emptying_excess` a. Regulation that rests: the valve shuts while |e| has not reached
+    /// `waking` H, then goes for its target until |e| is r H, `resting_share` r. All may be there, in this order.
     ///
     /// # In the data
     /// The pressure residual in slow stairs with the muscle locked: a constant that changes sign with the direction
@@ -23,7 +24,8 @@ crate::variables::variables! {
     /// # Validity
     /// Exact for a command of straight lines, but for steps: where a sticking pilot would rest for less than 20 ms between its
     /// jumps it moves along with the command, and stays where that slows down within 25 ms, so that a step is one jump. A command
-    /// that is held between communication points rests there: a pilot slides only where its derivative is given.
+    /// that is held between communication points rests there: a pilot slides only where its derivative is given. What rests wakes and falls
+    /// asleep some 6 ms late, about a cycle of a digital regulator.
     ///
     /// # Reference
     /// M. Choudhury, N. Thornhill, S. Shah (2005), Modelling valve stiction, doi 10.1016/j.conengprac.2004.05.005.
@@ -48,6 +50,10 @@ crate::variables::variables! {
         overlap_rounding: f64 = 0.0, ONE, (0.0..=3.0);
         /// By which share the overlap of the port for emptying is wider
         emptying_excess: f64 = 0.0, ONE, (-0.95..=10.0);
+        /// Deviation from the target pressure at which a valve that rests begins to regulate
+        waking: f64 = 0.0, PASCAL, (0.0..=2e5);
+        /// Share of that deviation at which it rests again
+        resting_share: f64 = 0.15, ONE, (0.0..=0.9);
         /// Where in its play the pilot starts, or in its overlap the pressure: -1 lower end, 1 upper end
         start: f64 = 0.0, ONE, (-1.0..=1.0);
     }
@@ -64,6 +70,17 @@ const STICTION_STARTS: &[f64] = &[
     0.269, 0.290, 0.312, 0.336, 0.362, 0.390, 0.420, 0.452, 0.487,
 ];
 
+/// Time constant in s with which it is found that a valve must regulate, or need not, and with which it begins, or ends.
+const WAKES_WITHIN: f64 = 4e-3;
+
+/// What the pressure does depends on every time that the valve woke, and sizes nearby are looked at as well: from one of these starts to the
+/// next, in Pa.
+#[rustfmt::skip]
+const WAKING_STARTS: &[f64] = &[
+    1.5e3, 1.8e3, 2.1e3, 2.5e3, 2.9e3, 3.4e3, 4.0e3, 4.8e3,
+    5.6e3, 6.7e3, 7.9e3, 9.3e3, 1.1e4, 1.3e4, 1.5e4, 1.8e4,
+];
+
 impl ValveDeadBand {
     /// Deviation in Pa above the target below which the port for emptying does not open.
     fn overlap_of_emptying(&self) -> f64 {
@@ -77,6 +94,14 @@ impl ValveDeadBand {
         rounded(error - overlap) - rounded(-overlap)
     }
 
+    /// The target in Pa as what is open of the ports goes for it.
+    fn beyond_overlap(&self, at: &Point, target: f64) -> f64 {
+        let error = target - at.gauge_pressure;
+        let overlap = if error < 0.0 { self.overlap_of_emptying() } else { self.pressure_overlap };
+        let beyond = self.overlap_steepness * self.opening(error.abs(), overlap);
+        at.gauge_pressure + error.signum() * beyond.min(error.abs())
+    }
+
     /// Whether a pilot that has broken loose goes on until the command turns.
     fn slides(&self) -> bool {
         self.sliding_speed < Self::default().sliding_speed
@@ -87,7 +112,7 @@ impl Effect for ValveDeadBand {
     const DESCRIPTION: Description = Description {
         name: "valve_dead_band",
         meaning: "small changes of the command do nothing: play or stiction of the pilot",
-        equation: "|u - w| <= play;  w <- u where |u - w| >= stiction, and then for as long as u keeps its direction;  dp/dt = 0 where -h (1 + a) < K w - p < h",
+        equation: "|u - w| <= play;  w <- u where |u - w| >= stiction, and then for as long as u keeps its direction;  dp/dt = 0 where -h (1 + a) < K w - p < h, or from |K w - p| < r H until |K w - p| > H",
         signature: "pressure residual of constant size that follows the direction of the command, or steps",
         experiment: "slow stairs and ramps of the command, up and down, with the muscle locked",
         reference: "Choudhury et al. 2005",
@@ -107,6 +132,7 @@ impl Effect for ValveDeadBand {
                 ("valve_dead_band.overlap_steepness", &[10.0]),
                 ("valve_dead_band.emptying_excess", &[1.5, -0.6]),
             ],
+            &[("valve_dead_band.waking", WAKING_STARTS), ("valve_dead_band.resting_share", &[0.15])],
         ],
         further_forms: &[&[
             ("valve_dead_band.stiction", &[0.03, 0.08, 0.15, 0.03, 0.08, 0.15, 0.03, 0.08, 0.15]),
@@ -121,8 +147,33 @@ impl Effect for ValveDeadBand {
         ],
     };
 
+    /// Whether the valve is to be awake, from −1 to 1, and how far it is. Were the first also the second, half a valve would follow a slow
+    /// ramp.
+    const STATE_SCALES: &'static [f64] = &[100.0, 100.0];
+
     fn is_neutral(&self) -> bool {
-        [self.play, self.play_growth, self.stiction, self.pressure_overlap] == [0.0; 4]
+        [self.play, self.play_growth, self.stiction, self.pressure_overlap, self.waking] == [0.0; 5]
+    }
+
+    fn rests(&self) -> bool {
+        self.waking == 0.0
+    }
+
+    fn start(&self, _at: &Point, own: &mut [f64]) {
+        own.copy_from_slice(&[-1.0, 0.0]);
+    }
+
+    fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
+        let error = (at.commanded_pressure - at.gauge_pressure).abs();
+        let asked = if error > self.waking {
+            1.0
+        } else if error < self.resting_share * self.waking {
+            -1.0
+        } else {
+            own[0].signum()
+        };
+        rates[0] = (asked - own[0]) / WAKES_WITHIN;
+        rates[1] = (f64::from(own[0] > 0.0) - own[1]) / WAKES_WITHIN;
     }
 
     /// A pilot that sticks ends each fast move anywhere within its threshold; one that slides goes on to its end.
@@ -132,7 +183,7 @@ impl Effect for ValveDeadBand {
 
     /// A valve that opens no port near its target rests where it started.
     fn at_rest(self) -> Self {
-        Self { pressure_overlap: 0.0, ..self }
+        Self { pressure_overlap: 0.0, waking: 0.0, ..self }
     }
 
     /// Rounded edges let nothing rest off its target.
@@ -148,14 +199,9 @@ impl Effect for ValveDeadBand {
         Slack { play, play_spread, play_growth, stiction, jump_time, sliding_speed, start }
     }
 
-    fn target_pressure(&self, at: &Point, _own: &[f64], target: f64) -> f64 {
-        if self.pressure_overlap == 0.0 {
-            return target;
-        }
-        let error = target - at.gauge_pressure;
-        let overlap = if error < 0.0 { self.overlap_of_emptying() } else { self.pressure_overlap };
-        let beyond = self.overlap_steepness * self.opening(error.abs(), overlap);
-        at.gauge_pressure + error.signum() * beyond.min(error.abs())
+    fn target_pressure(&self, at: &Point, own: &[f64], target: f64) -> f64 {
+        let target = if self.pressure_overlap > 0.0 { self.beyond_overlap(at, target) } else { target };
+        if self.waking > 0.0 { at.gauge_pressure + own[1] * (target - at.gauge_pressure) } else { target }
     }
 
     fn sentence(&self) -> String {
@@ -178,6 +224,10 @@ impl Effect for ValveDeadBand {
                 _ => format!(" where it fills and {:.3} bar where it empties", 1e-5 * self.overlap_of_emptying()),
             };
             parts.push(format!("no port opens for errors below {:.3} bar{emptying}", 1e-5 * self.pressure_overlap));
+        }
+        if self.waking > 0.0 {
+            let [waking, rests] = [1.0, self.resting_share].map(|share| 1e-5 * share * self.waking);
+            parts.push(format!("it regulates from errors of {waking:.3} bar on, down to {rests:.3} bar"));
         }
         format!("The valve ignores small changes of the command: {}.", parts.join(", "))
     }

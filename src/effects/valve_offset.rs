@@ -6,16 +6,15 @@ zero! {
     ///
     /// # Model
     /// u ← u + o + o_k + s exp(−t/τ) + a sin(2π t/T + φ) + j r, t since the start: `offset` o, `second` and `third` o_k in recording k, `settling` s,
-    /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j; r goes from 0 to 1 within
-    /// `shift_span` around `shift_time`.
+    /// `settling_time` τ, `swing` a, `swing_period` T, `swing_phase` φ, `shift` j, `second_shift` and `third_shift` in these recordings, in those
+    /// that follow all of it; r goes from 0 to 1 within `shift_span` around `shift_time`.
     ///
     /// # In the data
     /// A constant residual of the pressure, with the force that belongs to it. With an offset of the pressure sensor the
     /// force stays.
     ///
     /// # Validity
-    /// Constant, settling, swinging or shifted once, as the zeros of sensors; in every recording alike, from its start, but for a constant
-    /// that may be another one in each of up to three. Where it
+    /// Constant, settling, swinging or shifted once, as the zeros of sensors. Where it
     /// is constant at first and changed in the course of a simulation, t counts from that change.
     ///
     /// # Reference

@@ -414,6 +414,23 @@ class RoundedPorts(Plant):
         return VALVE_BANDWIDTH * np.sign(error) * 1e3 * (branch(abs(error) / 1e3) - branch(0.0))
 
 
+class RestingRegulator(Plant):
+    """Begins where the error has been above 8 kPa, and ends where it has been below 1.2 kPa, for ln 2 times 4 ms; both takes 4 ms."""
+
+    own_scales = (1.0, 1.0)
+
+    def own_start(self, x):
+        return [-1.0, 0.0]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        error, doubt = abs(target - pressure), np.sign(own[0])
+        wanted = np.select([error > 8e3, error < 1.2e3], [1.0, -1.0], doubt)
+        return [(wanted - own[0]) / 4e-3, (np.heaviside(own[0], 0.0) - own[1]) / 4e-3]
+
+    def pressure_rate(self, target, pressure, x, own):
+        return VALVE_BANDWIDTH * own[1] * (target - pressure)
+
+
 class FlowLimit(Plant):
     def pressure_rate(self, target, pressure, x, own):
         wanted = VALVE_BANDWIDTH * (target - pressure)
@@ -790,6 +807,7 @@ CASES = [
     Case("overlap", Overlap(), STAIRS),
     Case("unlike_ports", UnlikePorts(), STAIRS),
     Case("rounded_ports", RoundedPorts(), STAIRS),
+    Case("resting_regulator", RestingRegulator(), RAMPS),
     Case("flow_limit", FlowLimit(), STAIRS),
     Case("nozzle", Nozzle(), STAIRS),
     Case("moving_volume", MovingVolume(), STAIRS),

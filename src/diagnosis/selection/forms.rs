@@ -122,8 +122,7 @@ impl Search<'_> {
 
     /// Whether what an effect does in a rare form may as well come from what drives the muscle.
     fn may_be_driven(&self, fitted: &Fitted, part: Part) -> bool {
-        let effects = &fitted.parameters.effects;
-        part.is_rare() && self.bench.data.goes_with_inputs(|time| effects.own_course(part.effect.name, time))
+        part.is_rare() && self.bench.data.goes_with_inputs(&fitted.parameters, part.effect.name)
     }
 
     /// The hypothesis with refinements of its effects free, the last one's first, one of them or all, where the data pay

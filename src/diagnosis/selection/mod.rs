@@ -420,11 +420,13 @@ fn distinct(starts: &[Start]) -> impl Iterator<Item = &Start> {
         .map(|(_, s)| s)
 }
 
-/// Starts of an effect from which it is fitted. Those of forms with many minima are chosen among themselves: what these promise leaves out
+/// Starts of an effect from which it is fitted. Those of forms with many minima are chosen form by form: what these promise leaves out
 /// what they make worse.
 fn worth_fitting(starts: &[Start]) -> impl Iterator<Item = &Start> {
-    let of_kind = |many: bool| distinct(starts).filter(move |start| start.part.has_many_minima() == many).take(STARTS);
-    of_kind(false).chain(of_kind(true))
+    let (many, few): (Vec<&Start>, Vec<&Start>) = distinct(starts).partition(|start| start.part.has_many_minima());
+    let of_form = move |form: usize| many.clone().into_iter().filter(move |start| start.part.form == form).take(STARTS);
+    let forms = starts.first().map_or(0, |start| start.part.effect.all_forms().count());
+    few.into_iter().take(STARTS).chain((0..forms).flat_map(of_form))
 }
 
 /// From where each effect is best fitted.
