@@ -108,6 +108,19 @@ impl Course {
     }
 }
 
+/// The form of a zero that shifts once, by the parameter of a name, from an offset of a usual size.
+macro_rules! shifts_once {
+    ($prefix:literal, $shift:literal, $size:literal) => {
+        &[
+            (concat!($prefix, "offset"), &[$size]),
+            (concat!($prefix, $shift), &$crate::zero::either_way(0.2 * $size)),
+            (concat!($prefix, "shift_time"), $crate::zero::TIMES),
+            (concat!($prefix, "shift_span"), &[2.0]),
+        ]
+    };
+}
+pub(crate) use shifts_once;
+
 /// Parameters of an offset with its course over time, and how fits look for them from an offset of a usual size.
 macro_rules! zero {
     (
@@ -169,24 +182,9 @@ macro_rules! zero {
                     (concat!($prefix, "swing_period"), $crate::zero::PERIODS),
                     (concat!($prefix, "swing_phase"), $crate::zero::PHASES),
                 ],
-                &[
-                    (concat!($prefix, "offset"), &[$size]),
-                    (concat!($prefix, "shift"), &$crate::zero::either_way(0.2 * $size)),
-                    (concat!($prefix, "shift_time"), $crate::zero::TIMES),
-                    (concat!($prefix, "shift_span"), &[2.0]),
-                ],
-                &[
-                    (concat!($prefix, "offset"), &[$size]),
-                    (concat!($prefix, "second_shift"), &$crate::zero::either_way(0.2 * $size)),
-                    (concat!($prefix, "shift_time"), $crate::zero::TIMES),
-                    (concat!($prefix, "shift_span"), &[2.0]),
-                ],
-                &[
-                    (concat!($prefix, "offset"), &[$size]),
-                    (concat!($prefix, "third_shift"), &$crate::zero::either_way(0.2 * $size)),
-                    (concat!($prefix, "shift_time"), $crate::zero::TIMES),
-                    (concat!($prefix, "shift_span"), &[2.0]),
-                ],
+                $crate::zero::shifts_once!($prefix, "shift", $size),
+                $crate::zero::shifts_once!($prefix, "second_shift", $size),
+                $crate::zero::shifts_once!($prefix, "third_shift", $size),
             ];
             const REFINEMENTS: &'static [$crate::effects::Freed] =
                 &[(concat!($prefix, "settling"), &[0.3 * $size]), (concat!($prefix, "settling_time"), &[5.0])];

@@ -146,6 +146,11 @@ pub fn recordings_for(name: &str) -> usize {
     }
 }
 
+/// Whether a parameter makes so many recordings unlike: what shifts in the first one stays so in those that follow.
+pub fn tells_apart(name: &str, recordings: usize) -> bool {
+    recordings_for(name) > 1 || recordings > 1 && name.ends_with(".shift")
+}
+
 /// The most starts that any parameter has.
 pub fn count_starts<'f>(freed: impl Iterator<Item = &'f Freed>) -> usize {
     freed.map(|(_, starts)| starts.len()).max().unwrap_or(0)

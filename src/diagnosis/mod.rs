@@ -31,7 +31,7 @@ use crate::quality;
 use crate::simulation::replay;
 use crate::variables::Declared;
 use fits::{Bench, Fitted};
-use hypothesis::{Off, Part, recordings_for};
+use hypothesis::{Off, Part, tells_apart};
 use residuals::{Data, Scope};
 use selection::{Chosen, Judged, MOST_EFFECTS};
 use serde::Serialize;
@@ -261,8 +261,7 @@ fn unlisted(bench: &Bench, chosen: &Chosen) -> Option<Remaining> {
 
 /// How to simulate another recording than the first with causes that have values of their own there.
 fn of_several(chosen: &Chosen, recordings: &[Recording]) -> Option<String> {
-    let is_of_one = |name: &str| recordings_for(name) > 1 || recordings.len() > 1 && name.ends_with(".shift");
-    let differ = |part: &&Part| part.freed().any(|(name, _)| is_of_one(name));
+    let differ = |part: &&Part| part.freed().any(|(name, _)| tells_apart(name, recordings.len()));
     let numbers = chosen.model.hypothesis.parts.iter().filter(differ);
     let numbers: Vec<_> = numbers.map(|part| format!("`{}.recording`", part.effect.name)).collect();
     let names: Vec<_> =

@@ -15,7 +15,8 @@ zero! {
     ///
     /// # Validity
     /// A sensor of absolute pressure is one bar off. Constant, settling while the sensor warms up from the start of the recording, swinging with what is around it, or shifted
-    /// once by a shock in one of up to three recordings, at the same time where in several; else in every recording alike, from its start, but for a constant that may be another one in each.
+    /// once by a shock in one of up to three recordings, at the same time where in several; else in every recording alike, from its start, but
+    /// for a constant that may be another one in each.
     ///
     /// # Reference
     /// Definition of an offset.

@@ -423,10 +423,12 @@ fn distinct(starts: &[Start]) -> impl Iterator<Item = &Start> {
 /// Starts of an effect from which it is fitted. Those of forms with many minima are chosen form by form: what these promise leaves out
 /// what they make worse.
 fn worth_fitting(starts: &[Start]) -> impl Iterator<Item = &Start> {
-    let (many, few): (Vec<&Start>, Vec<&Start>) = distinct(starts).partition(|start| start.part.has_many_minima());
-    let of_form = move |form: usize| many.clone().into_iter().filter(move |start| start.part.form == form).take(STARTS);
-    let forms = starts.first().map_or(0, |start| start.part.effect.all_forms().count());
-    few.into_iter().take(STARTS).chain((0..forms).flat_map(of_form))
+    let mut taken: BTreeMap<Option<usize>, usize> = BTreeMap::new();
+    distinct(starts).filter(move |start| {
+        let of_kind = taken.entry(start.part.has_many_minima().then_some(start.part.form)).or_default();
+        *of_kind += 1;
+        *of_kind <= STARTS
+    })
 }
 
 /// From where each effect is best fitted.
