@@ -1,6 +1,6 @@
 //! Zeros of sensors and of the valve, which need not stay where they are while one records.
 
-use crate::effects::{each_for, of_recording, told_anew};
+use crate::effects::{each_for, of_recording, settled, told_anew};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
@@ -35,12 +35,8 @@ impl Course {
     #[inline]
     pub fn at(&self, time: f64) -> f64 {
         let time = time.max(0.0);
-        let (settling, constant) = self.settling;
         let (swing, period, phase) = self.swing;
-        let mut zero = self.offset + of_recording(self.recording, self.anew);
-        if settling != 0.0 {
-            zero += settling * (-time / constant).exp();
-        }
+        let mut zero = self.offset + of_recording(self.recording, self.anew) + settled(self.settling, time);
         if swing != 0.0 {
             zero += swing * (TAU * time / period + phase).sin();
         }

@@ -142,6 +142,7 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("slower_when_short", &[("valve_lag.time_constant", 0.03), ("valve_lag.growth_with_contraction", 0.7)]),
+        ("slow_tail", &[("valve_lag.second_time_constant", 0.8), ("valve_lag.second_share", 0.15)]),
         (
             "averaged_position",
             &[("contraction_sensor_delay.delay", 0.03), ("contraction_sensor_delay.averaging", 0.08)],
@@ -262,6 +263,14 @@ fn effects_agree_with_scipy() {
                 ("valve_offset.swing", 0.036),
                 ("valve_offset.swing_period", 8.5),
                 ("valve_offset.swing_phase", 0.7),
+            ],
+        ),
+        (
+            "warming_scale",
+            &[
+                ("contraction_sensor_gain.relative_error", -0.05),
+                ("contraction_sensor_gain.settling", -0.03),
+                ("contraction_sensor_gain.settling_time", 2.0),
             ],
         ),
         (

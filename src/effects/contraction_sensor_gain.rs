@@ -1,16 +1,17 @@
-use super::{Description, Effect, Holds, REFERENCE_CONTRACTION, Readings, scaled, unscaled};
+use super::{Description, Effect, Holds, REFERENCE_CONTRACTION, Readings, scaled, settled, told_settling, unscaled};
 
 crate::variables::variables! {
     /// A position sensor whose scale is off.
     ///
     /// # Model
-    /// x_measured ← x_measured (1 + g + b (x_measured/0.1 m − 1)): `relative_error` g, `bend` b.
+    /// x_measured ← x_measured (1 + g + b (x_measured/0.1 m − 1) + s exp(−t/τ)), t since the start: `relative_error` g, `bend` b,
+    /// `settling` s, `settling_time` τ.
     ///
     /// # In the data
     /// The residual of the contraction is in proportion to the contraction; the force is as it should be for the true one.
     ///
     /// # Validity
-    /// Constant over a recording; slightly bent scales.
+    /// Constant over a recording, or settling while the amplifier warms up from its start, in every recording alike; slightly bent scales.
     ///
     /// # Reference
     /// Definition of a gain; linearity errors in data sheets of sensors (up to 1 % of full scale).
@@ -19,6 +20,10 @@ crate::variables::variables! {
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Change of the scale per 0.1 m away from 0.1 m
         bend: f64 = 0.0, ONE, (-0.1..=0.1);
+        /// Excess of the scale at the start, which settles
+        settling: f64 = 0.0, ONE, (-0.3..=0.3);
+        /// Time constant of the settling
+        settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
     }
 }
 
@@ -26,7 +31,7 @@ impl Effect for ContractionSensorGain {
     const DESCRIPTION: Description = Description {
         name: "contraction_sensor_gain",
         meaning: "the scale of the position sensor is off",
-        equation: "x_measured <- x_measured (1 + g + b (x_measured/0.1 m - 1))",
+        equation: "x_measured <- x_measured (1 + g + b (x_measured/0.1 m - 1) + s exp(-t/tau))",
         signature: "residual of the contraction in proportion to it",
         experiment: "compare with a ruler at two lengths",
         reference: "definition",
@@ -37,28 +42,37 @@ impl Effect for ContractionSensorGain {
             // A gain alone may be what the coefficients of the muscle stand for.
             &[("contraction_sensor_gain.bend", &[0.02]), ("contraction_sensor_gain.relative_error", &[0.0])],
         ],
-        further_forms: &[],
+        further_forms: &[&[
+            ("contraction_sensor_gain.relative_error", &[0.05]),
+            ("contraction_sensor_gain.settling", &[0.02, -0.02, 0.02, -0.02]),
+            ("contraction_sensor_gain.settling_time", &[4.0, 4.0, 15.0, 15.0]),
+        ]],
         refinements: &[("contraction_sensor_gain.bend", &[0.005])],
     };
-    const ENDS_INSIDE: &'static [&'static str] = &["contraction_sensor_gain.bend"];
+    const ENDS_INSIDE: &'static [&'static str] =
+        &["contraction_sensor_gain.bend", "contraction_sensor_gain.settling", "contraction_sensor_gain.settling_time"];
 
     fn is_neutral(&self) -> bool {
-        self.relative_error == 0.0 && self.bend == 0.0
+        [self.relative_error, self.bend, self.settling] == [0.0; 3]
+    }
+
+    fn own_course(&self, time: f64) -> f64 {
+        settled((self.settling, self.settling_time), time)
     }
 
     fn readings(&self, readings: Readings) -> Readings {
-        Readings {
-            contraction: scaled(readings.contraction, self.relative_error, self.bend, REFERENCE_CONTRACTION),
-            ..readings
-        }
+        let error = self.relative_error + self.own_course(readings.time);
+        Readings { contraction: scaled(readings.contraction, error, self.bend, REFERENCE_CONTRACTION), ..readings }
     }
 
-    fn true_contraction(&self, reading: f64, _force: f64, _time: f64) -> f64 {
-        unscaled(reading, self.relative_error, self.bend, REFERENCE_CONTRACTION)
+    fn true_contraction(&self, reading: f64, _force: f64, time: f64) -> f64 {
+        unscaled(reading, self.relative_error + self.own_course(time), self.bend, REFERENCE_CONTRACTION)
     }
 
     fn sentence(&self) -> String {
         let word = if self.relative_error < 0.0 { "less" } else { "more" };
-        format!("The position sensor shows {:.1} % {word} than there is.", 100.0 * self.relative_error.abs())
+        let percent = 100.0 * self.relative_error.abs();
+        let warms = told_settling((self.settling, self.settling_time));
+        format!("The position sensor shows {percent:.1} % {word} than there is{warms}.")
     }
 }

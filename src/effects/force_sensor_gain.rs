@@ -1,17 +1,18 @@
-use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings, by_curvature, scaled};
+use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings, by_curvature, scaled, settled, told_settling};
 
 crate::variables::variables! {
     /// A force sensor whose scale is off.
     ///
     /// # Model
-    /// F_measured ← F_measured (1 + g + b (r − 1) + c (r² − 1)), r = F_measured/400 N: `relative_error` g, `bend` b, `curvature` c.
+    /// F_measured ← F_measured (1 + g + b (r − 1) + c (r² − 1) + s exp(−t/τ)), r = F_measured/400 N, t since the start: `relative_error` g, `bend` b,
+    /// `curvature` c, `settling` s, `settling_time` τ.
     ///
     /// # In the data
     /// The residual of the force is in proportion to the force, while the motion is as nominal; with a gain of the muscle the
     /// motion follows.
     ///
     /// # Validity
-    /// Constant over a recording; slightly bent scales; the curvature is that of a cell or an amplifier whose scale falls with the force.
+    /// Constant over a recording, or settling while the amplifier warms up from its start, in every recording alike; slightly bent scales; the curvature is that of a cell or an amplifier whose scale falls with the force.
     ///
     /// # Reference
     /// Definition of a gain; linearity errors in data sheets of sensors (up to 1 % of full scale).
@@ -22,6 +23,10 @@ crate::variables::variables! {
         bend: f64 = 0.0, ONE, (-0.1..=0.1);
         /// Change of the scale with the square of the force, per that of 400 N
         curvature: f64 = 0.0, ONE, (-0.03..=0.03);
+        /// Excess of the scale at the start, which settles
+        settling: f64 = 0.0, ONE, (-0.3..=0.3);
+        /// Time constant of the settling
+        settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
     }
 }
 
@@ -29,7 +34,7 @@ impl Effect for ForceSensorGain {
     const DESCRIPTION: Description = Description {
         name: "force_sensor_gain",
         meaning: "the scale of the force sensor is off",
-        equation: "F_measured <- F_measured (1 + g + b (r - 1) + c (r^2 - 1)), r = F_measured/400 N",
+        equation: "F_measured <- F_measured (1 + g + b (r - 1) + c (r^2 - 1) + s exp(-t/tau)), r = F_measured/400 N",
         signature: "residual of the force in proportion to it",
         experiment: "hang two known masses on the sensor",
         reference: "definition",
@@ -40,22 +45,38 @@ impl Effect for ForceSensorGain {
             // A gain alone may be what the coefficients of the muscle stand for.
             &[("force_sensor_gain.bend", &[0.02]), ("force_sensor_gain.relative_error", &[0.0])],
         ],
-        further_forms: &[],
+        further_forms: &[&[
+            ("force_sensor_gain.relative_error", &[0.05]),
+            ("force_sensor_gain.settling", &[0.02, -0.02, 0.02, -0.02]),
+            ("force_sensor_gain.settling_time", &[4.0, 4.0, 15.0, 15.0]),
+        ]],
         refinements: &[("force_sensor_gain.bend", &[0.005]), ("force_sensor_gain.curvature", &[0.002])],
     };
-    const ENDS_INSIDE: &'static [&'static str] = &["force_sensor_gain.bend", "force_sensor_gain.curvature"];
+    const ENDS_INSIDE: &'static [&'static str] = &[
+        "force_sensor_gain.bend",
+        "force_sensor_gain.curvature",
+        "force_sensor_gain.settling",
+        "force_sensor_gain.settling_time",
+    ];
 
     fn is_neutral(&self) -> bool {
-        [self.relative_error, self.bend, self.curvature] == [0.0; 3]
+        [self.relative_error, self.bend, self.curvature, self.settling] == [0.0; 4]
+    }
+
+    fn own_course(&self, time: f64) -> f64 {
+        settled((self.settling, self.settling_time), time)
     }
 
     fn readings(&self, readings: Readings) -> Readings {
         let curved = by_curvature(readings.force, self.curvature, REFERENCE_FORCE);
-        Readings { force: scaled(readings.force, self.relative_error + curved, self.bend, REFERENCE_FORCE), ..readings }
+        let error = self.relative_error + curved + self.own_course(readings.time);
+        Readings { force: scaled(readings.force, error, self.bend, REFERENCE_FORCE), ..readings }
     }
 
     fn sentence(&self) -> String {
         let word = if self.relative_error < 0.0 { "less" } else { "more" };
-        format!("The force sensor shows {:.1} % {word} than there is.", 100.0 * self.relative_error.abs())
+        let percent = 100.0 * self.relative_error.abs();
+        let warms = told_settling((self.settling, self.settling_time));
+        format!("The force sensor shows {percent:.1} % {word} than there is{warms}.")
     }
 }

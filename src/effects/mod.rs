@@ -68,6 +68,20 @@ fn exponential(rate: f64, at: f64, reference: f64) -> f64 {
     (rate * at).exp_m1() / (rate * reference).exp_m1()
 }
 
+/// What is left at a time in s of an excess at the start that settles with a time constant in s; before the start all of it.
+#[inline]
+pub(crate) fn settled((excess, constant): (f64, f64), time: f64) -> f64 {
+    if excess == 0.0 { 0.0 } else { excess * (-time.max(0.0) / constant).exp() }
+}
+
+/// What follows a sentence about a scale that settles so.
+fn told_settling((excess, constant): (f64, f64)) -> String {
+    if excess == 0.0 {
+        return String::new();
+    }
+    format!(", {:+.1} % on top at the start, which settle within {constant:.1} s", 100.0 * excess)
+}
+
 /// The rate of an exponential: nearer to zero the differences from one are those of rounding.
 fn not_zero(rate: f64) -> f64 {
     rate.abs().max(1e-6).copysign(rate)

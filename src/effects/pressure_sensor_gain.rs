@@ -1,17 +1,18 @@
-use super::{Description, Effect, Holds, REFERENCE_PRESSURE, Readings, scaled, unscaled};
+use super::{Description, Effect, Holds, REFERENCE_PRESSURE, Readings, scaled, settled, told_settling, unscaled};
 
 crate::variables::variables! {
     /// A pressure sensor whose scale is off.
     ///
     /// # Model
-    /// p_measured ← p_measured (1 + g + b (p_measured/2 bar − 1)): `relative_error` g, `bend` b.
+    /// p_measured ← p_measured (1 + g + b (p_measured/2 bar − 1) + s exp(−t/τ)), t since the start: `relative_error` g, `bend` b,
+    /// `settling` s, `settling_time` τ.
     ///
     /// # In the data
     /// The residual of the pressure is in proportion to the pressure with a force that fits the command; with a gain of the
     /// valve the force follows the pressure.
     ///
     /// # Validity
-    /// Constant over a recording; slightly bent scales.
+    /// Constant over a recording, or settling while the amplifier warms up from its start, in every recording alike; slightly bent scales.
     ///
     /// # Reference
     /// Definition of a gain; linearity errors in data sheets of sensors (up to 1 % of full scale).
@@ -20,6 +21,10 @@ crate::variables::variables! {
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Change of the scale per 2 bar away from 2 bar
         bend: f64 = 0.0, ONE, (-0.1..=0.1);
+        /// Excess of the scale at the start, which settles
+        settling: f64 = 0.0, ONE, (-0.3..=0.3);
+        /// Time constant of the settling
+        settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
     }
 }
 
@@ -27,7 +32,7 @@ impl Effect for PressureSensorGain {
     const DESCRIPTION: Description = Description {
         name: "pressure_sensor_gain",
         meaning: "the scale of the pressure sensor is off",
-        equation: "p_measured <- p_measured (1 + g + b (p_measured/2 bar - 1))",
+        equation: "p_measured <- p_measured (1 + g + b (p_measured/2 bar - 1) + s exp(-t/tau))",
         signature: "residual of the pressure in proportion to it",
         experiment: "compare with a second gauge at two pressures",
         reference: "definition",
@@ -38,28 +43,37 @@ impl Effect for PressureSensorGain {
             // A gain alone may be what the coefficients of the muscle stand for.
             &[("pressure_sensor_gain.bend", &[0.02]), ("pressure_sensor_gain.relative_error", &[0.0])],
         ],
-        further_forms: &[],
+        further_forms: &[&[
+            ("pressure_sensor_gain.relative_error", &[0.05]),
+            ("pressure_sensor_gain.settling", &[0.02, -0.02, 0.02, -0.02]),
+            ("pressure_sensor_gain.settling_time", &[4.0, 4.0, 15.0, 15.0]),
+        ]],
         refinements: &[("pressure_sensor_gain.bend", &[0.005])],
     };
-    const ENDS_INSIDE: &'static [&'static str] = &["pressure_sensor_gain.bend"];
+    const ENDS_INSIDE: &'static [&'static str] =
+        &["pressure_sensor_gain.bend", "pressure_sensor_gain.settling", "pressure_sensor_gain.settling_time"];
 
     fn is_neutral(&self) -> bool {
-        self.relative_error == 0.0 && self.bend == 0.0
+        [self.relative_error, self.bend, self.settling] == [0.0; 3]
+    }
+
+    fn own_course(&self, time: f64) -> f64 {
+        settled((self.settling, self.settling_time), time)
     }
 
     fn readings(&self, readings: Readings) -> Readings {
-        Readings {
-            gauge_pressure: scaled(readings.gauge_pressure, self.relative_error, self.bend, REFERENCE_PRESSURE),
-            ..readings
-        }
+        let error = self.relative_error + self.own_course(readings.time);
+        Readings { gauge_pressure: scaled(readings.gauge_pressure, error, self.bend, REFERENCE_PRESSURE), ..readings }
     }
 
-    fn true_pressure(&self, reading: f64, _time: f64) -> f64 {
-        unscaled(reading, self.relative_error, self.bend, REFERENCE_PRESSURE)
+    fn true_pressure(&self, reading: f64, time: f64) -> f64 {
+        unscaled(reading, self.relative_error + self.own_course(time), self.bend, REFERENCE_PRESSURE)
     }
 
     fn sentence(&self) -> String {
         let word = if self.relative_error < 0.0 { "less" } else { "more" };
-        format!("The pressure sensor shows {:.1} % {word} than there is.", 100.0 * self.relative_error.abs())
+        let percent = 100.0 * self.relative_error.abs();
+        let warms = told_settling((self.settling, self.settling_time));
+        format!("The pressure sensor shows {percent:.1} % {word} than there is{warms}.")
     }
 }

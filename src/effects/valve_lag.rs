@@ -1,4 +1,5 @@
 use super::{Description, Effect, Holds, Point};
+use std::fmt::Write;
 
 /// The time constant stays above this share of what it is at the reference pressure.
 const LEAST_SHARE: f64 = 0.05;
@@ -20,7 +21,8 @@ crate::variables::variables! {
     /// 1/ω ← 1/ω + τ (1 + g (p/p₀ − 1) + h x/0.1 m), times 1 + e while emptying: `time_constant` τ of a long muscle at
     /// p₀ = 2 bar, its `growth_with_pressure` g and, with the volume, `growth_with_contraction` h, `emptying_excess` e. A
     /// hose or pilot stage before the valve is a pole of its own: τ₂ dq/dt = p_target − q, and the valve goes for q:
-    /// `second_time_constant` τ₂; with both, one after the other, `third_time_constant` τ₃.
+    /// `second_time_constant` τ₂; with both, one after the other, `third_time_constant` τ₃. Where only a `second_share` c of the way takes the
+    /// second pole, as of a stage that is adjusted slowly, the valve goes for p_target + c (q − p_target).
     ///
     /// # In the data
     /// The pressure residual is in proportion to the rate of pressure and vanishes when the command is slow; steps of
@@ -37,6 +39,8 @@ crate::variables::variables! {
         time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
         /// Time constant of a second pole before the valve
         second_time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
+        /// Share of the way that the second pole delays
+        second_share: f64 = 1.0, ONE, (0.0..=1.0);
         /// Time constant of a third pole, after the second
         third_time_constant: f64 = 0.0, SECOND, (0.0..=10.0);
         /// Relative change of the additional time constant from 0 to 2 bar
@@ -45,6 +49,16 @@ crate::variables::variables! {
         growth_with_contraction: f64 = 0.0, ONE, (-0.9..=5.0);
         /// Relative excess of the additional time constant while emptying
         emptying_excess: f64 = 0.0, ONE, (-0.9..=5.0);
+    }
+}
+
+impl ValveLag {
+    /// Gauge pressure in Pa behind the second pole.
+    fn behind_second(&self, target: f64, own: &[f64]) -> f64 {
+        if self.second_time_constant == 0.0 {
+            return target; // (1 - c) p + c p need not be p to the last bit
+        }
+        (1.0 - self.second_share) * target + self.second_share * passed(target, own[0], self.second_time_constant)
     }
 }
 
@@ -59,7 +73,11 @@ impl Effect for ValveLag {
         of_load: false,
         holds: Holds::AsLaw,
         forms: &[&[("valve_lag.time_constant", &[0.05])], &[("valve_lag.second_time_constant", &[0.05])]],
-        further_forms: &[],
+        further_forms: &[&[
+            ("valve_lag.second_time_constant", &[0.3, 1.0]),
+            ("valve_lag.second_share", &[0.1]),
+            ("valve_lag.time_constant", &[0.0]),
+        ]],
         refinements: &[
             ("valve_lag.time_constant", &[0.02]),
             ("valve_lag.second_time_constant", &[0.02]),
@@ -81,7 +99,7 @@ impl Effect for ValveLag {
     }
 
     fn lateness(&self, _bandwidth: f64) -> f64 {
-        self.second_time_constant + self.third_time_constant
+        self.second_share * self.second_time_constant + self.third_time_constant
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {
@@ -89,7 +107,7 @@ impl Effect for ValveLag {
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
-        let second = passed(at.commanded_pressure, own[0], self.second_time_constant);
+        let second = self.behind_second(at.commanded_pressure, own);
         if self.second_time_constant > 0.0 {
             rates[0] = (at.commanded_pressure - own[0]) / self.second_time_constant.max(SHORTEST);
         }
@@ -99,7 +117,7 @@ impl Effect for ValveLag {
     }
 
     fn target_pressure(&self, _at: &Point, own: &[f64], target: f64) -> f64 {
-        let second = passed(target, own[0], self.second_time_constant);
+        let second = self.behind_second(target, own);
         passed(second, own[1], self.third_time_constant)
     }
 
@@ -118,9 +136,13 @@ impl Effect for ValveLag {
         let longer = format!("its time constant is {:.0} ms longer", 1e3 * self.time_constant);
         let before =
             |what: &str, time: f64| format!("a {what} delay of first order, {:.0} ms, comes before it", 1e3 * time);
+        let mut second = before("second", self.second_time_constant);
+        if self.second_share < 1.0 {
+            let _ = write!(second, " for {:.1} % of the way", 100.0 * self.second_share);
+        }
         let parts = [
             (self.time_constant, longer),
-            (self.second_time_constant, before("second", self.second_time_constant)),
+            (self.second_time_constant, second),
             (self.third_time_constant, before("third", self.third_time_constant)),
         ];
         let said: Vec<String> = parts.into_iter().filter(|(time, _)| *time != 0.0).map(|(_, words)| words).collect();

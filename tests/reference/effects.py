@@ -229,6 +229,21 @@ class SlowerWhenShort(Plant):
         return (target - pressure) / (1 / VALVE_BANDWIDTH + 0.03 * (1 + 7 * x))
 
 
+class SlowTail(Plant):
+    """A stage that is adjusted slowly gives the last 15 % of the way."""
+
+    own_scales = (1e5,)
+
+    def own_start(self, x):
+        return [VALVE_GAIN * STAIRS[0]]
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return [(target - own[0]) / 0.8]
+
+    def pressure_rate(self, target, pressure, x, own):
+        return VALVE_BANDWIDTH * (0.85 * target + 0.15 * own[0] - pressure)
+
+
 class DeadTime(Plant):
     DELAY = 0.0373
 
@@ -570,6 +585,13 @@ class ShiftingZero(Timed):
         return x + np.interp(own[:, 0], [1.9, 2.5], [4e-3, 1.6e-3])
 
 
+class WarmingScale(Timed):
+    """A position sensor that shows 5 % less than there is, and 8 % less at first."""
+
+    def readings(self, x, force, own):
+        return x * (0.95 - 0.03 * np.exp(-own[:, 0] / 2.0))
+
+
 class WarmByWork(Plant):
     """Warmed by the power of the pressure's pull; 10 W would make it 2 % stronger for good and the membrane 3 % softer."""
 
@@ -791,6 +813,7 @@ CASES = [
     Case("regulator", Regulator(), STAIRS),
     Case("slow_regulator", SlowRegulator(), STAIRS),
     Case("slower_when_short", SlowerWhenShort(), STAIRS),
+    Case("slow_tail", SlowTail(), STAIRS),
     Case("uneven_dead_time", UnevenDeadTime(), RAMPS),
     Case("averaged_position", AveragedPosition(), RAMPS),
     Case("filtered_position", FilteredPosition(), RAMPS),
@@ -821,6 +844,7 @@ CASES = [
     Case("two_switches", TwoSwitches(), STAIRS),
     Case("swinging_zero", SwingingZero(), STAIRS),
     Case("shifting_zero", ShiftingZero(), STAIRS),
+    Case("warming_scale", WarmingScale(), STAIRS),
     Case("warm_by_work", WarmByWork(), STAIRS),
     Case("warm_by_way", WarmByWay(), STAIRS),
     Case("warm_coil", WarmCoil(), STAIRS),
