@@ -1,6 +1,6 @@
 //! The main job in one go, on recordings that ship with the program.
 
-use crate::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, diagnose, report};
+use crate::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, Fitting, diagnose, report};
 use crate::export;
 use crate::measurement::{Recording, numbered};
 use crate::package::Library;
@@ -27,21 +27,20 @@ pub struct Demo {
     pub files: Vec<PathBuf>,
 }
 
-/// Runs the demonstration into a folder.
+/// Runs the demonstration into a folder; `fitting` is told what [`diagnose`] is at.
 ///
 /// # Errors
 /// [`crate::Error::Io`] where the folder cannot be written.
-pub fn run(folder: &Path, done: &(dyn Fn(&str) + Sync)) -> Result<Demo> {
+pub fn run(folder: &Path, fitting: &Fitting<'_>) -> Result<Demo> {
     let nominal = Parameters::preset("dmsp-40-1000")?;
     let libraries = [Library::embedded()?];
     let closed_loop = closed_loop(&nominal, 1e-3, nominal.reference.duration() + 2.0)?;
-    done("closed loop");
     let recordings = RECORDINGS
         .iter()
         .map(|(name, text)| Recording::parse(text, Path::new(name), &[]))
         .collect::<Result<Vec<_>>>()?;
     let recordings = numbered(recordings);
-    let diagnosis = diagnose(&nominal, &recordings, DEFAULT_TOLERANCE, done)?;
+    let diagnosis = diagnose(&nominal, &recordings, DEFAULT_TOLERANCE, fitting)?;
     let mut files = diagnosis::report::files(&diagnosis, &nominal, &recordings, &libraries, &folder.join("diagnosis"))?;
     files.push((folder.join("closed_loop.svg"), closed_loop_plot(&closed_loop).into_bytes()));
     for (name, bytes) in RECORDINGS {

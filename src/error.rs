@@ -81,12 +81,15 @@ pub enum Error {
     },
     /// The load does not hang still at this pressure for any length of the muscle.
     #[error(
-        "no length of the muscle holds {mass} kg at {gauge_pressure} Pa: \
-         change `load.mass` or `initial.gauge_pressure`"
+        "no length of the muscle holds {mass} kg{} at {gauge_pressure} Pa: change `load.mass`, `load.external_force` or \
+         `initial.gauge_pressure`",
+        if *external_force == 0.0 { String::new() } else { format!(" and {external_force} N") }
     )]
     NoEquilibrium {
         /// Total hanging mass, kg.
         mass: f64,
+        /// Force that pulls beyond its weight, N.
+        external_force: f64,
         /// Gauge pressure at the start, Pa.
         gauge_pressure: f64,
     },

@@ -21,6 +21,7 @@ pub mod muscle;
 pub mod parameters;
 pub mod plant;
 pub mod reference;
+mod scale;
 pub mod valve;
 mod zero;
 

@@ -18,6 +18,7 @@ use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, repr
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 #[derive(Parser)]
 #[command(version, about = "Pneumatic artificial muscles as FMUs that learn from measurements")]
@@ -410,6 +411,14 @@ fn progress(pieces: usize) -> ProgressBar {
     ProgressBar::new(pieces as u64).with_style(style)
 }
 
+/// What a diagnosis is at, on stderr: how many fits it takes nobody knows.
+fn fits() -> ProgressBar {
+    let style = ProgressStyle::with_template("{spinner} {elapsed}, fit {pos}: {wide_msg}").expect("a valid template");
+    let fits = ProgressBar::new_spinner().with_style(style).with_message("the nominal model");
+    fits.enable_steady_tick(Duration::from_millis(200));
+    fits
+}
+
 fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
     let mut files = vec![(out.join("simulated.csv"), report::simulated_csv(&[("simulated", parameters)], recordings)?)];
     let (mut rows, mut errors) = (Vec::new(), Vec::new());
@@ -514,15 +523,12 @@ fn run_comparison(
 }
 
 fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {
-    let bar = progress(Effects::DESCRIPTIONS.len() + 1);
-    let found = diagnose(parameters, recordings, tolerance, &|name| {
-        if bar.length() == Some(bar.position()) {
-            bar.reset(); // a second round
-        }
-        bar.set_message(name.to_owned());
-        bar.inc(1);
+    let fits = fits();
+    let found = diagnose(parameters, recordings, tolerance, &|effects| {
+        fits.set_message(effects.to_owned());
+        fits.inc(1);
     })?;
-    bar.finish_and_clear();
+    fits.finish_and_clear();
     let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
     let files = export::write_whole(files)?;
     let mut json = report::to_json(&found);
@@ -636,12 +642,12 @@ fn run_reproduction(out: &Path) -> Result<Answer> {
 }
 
 fn run_demo(out: &Path) -> Result<Answer> {
-    let bar = progress(Effects::DESCRIPTIONS.len() + 2);
-    let made = demo::run(out, &|name| {
-        bar.set_message(name.to_owned());
-        bar.inc(1);
+    let fits = fits();
+    let made = demo::run(out, &|effects| {
+        fits.set_message(effects.to_owned());
+        fits.inc(1);
     })?;
-    bar.finish_and_clear();
+    fits.finish_and_clear();
     let text = format!(
         "1. Exported the nominal FMUs to {nominal}.\n\
          2. Simulated the closed loop: largest control error {error:.2} mm ({out}/closed_loop.svg).\n\

@@ -231,6 +231,11 @@ impl Recording {
         self.time[self.time.len() - 1] - self.time[0]
     }
 
+    /// Times of the samples since the first one, s.
+    pub fn since_start(&self) -> Vec<f64> {
+        self.time.iter().map(|now| now - self.time[0]).collect()
+    }
+
     /// Usual time between samples, s.
     pub fn period(&self) -> f64 {
         let mut steps: Vec<f64> = self.time.windows(2).map(|pair| pair[1] - pair[0]).collect();

@@ -443,7 +443,11 @@ impl System for PneumaticMuscle {
         let mass = |contraction| masses(parameters, contraction).0;
         let weight = |contraction| mass(contraction) * GRAVITY + inputs.external_force;
         let hanging = equilibrium_with(parameters, gauge_pressure, weight);
-        let contraction = hanging.ok_or_else(|| Error::NoEquilibrium { mass: mass(0.0), gauge_pressure })?;
+        let contraction = hanging.ok_or_else(|| Error::NoEquilibrium {
+            mass: mass(0.0),
+            external_force: inputs.external_force,
+            gauge_pressure,
+        })?;
         Ok(hanging_state(parameters, &at_start(parameters, gauge_pressure, contraction)))
     }
 

@@ -207,7 +207,7 @@ impl<'a> Motion<'a> {
     fn of(parameters: &'a Parameters, recording: &Recording) -> Self {
         let time = &recording.time;
         let mut readings = recording.bridged(Signal::Contraction).unwrap_or_else(|| vec![0.0; time.len()]);
-        let since: Vec<f64> = time.iter().map(|now| now - time[0]).collect();
+        let since = recording.since_start();
         let averaging = parameters.effects.contraction_averaging();
         let first = readings[0];
         let filter = parameters.effects.contraction_filter();

@@ -1,6 +1,7 @@
 //! Zeros of sensors and of the valve, which need not stay where they are while one records.
 
-use crate::effects::{each_for, of_recording, settled, told_anew};
+use crate::effects::{each_for, of_recording, told_anew};
+use crate::scale::settled;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
@@ -49,8 +50,12 @@ impl Course {
     /// By how much it has shifted.
     fn shifted(&self, time: f64) -> f64 {
         let ([first, second, third], middle, lasts) = self.shifts;
-        let before = of_recording(self.recording, [first, first + second]);
-        let now = first + of_recording(self.recording, [second - first, third - first]);
+        let (before, now) = match self.recording {
+            ..1.5 => (0.0, first),
+            ..2.5 => (first, second),
+            ..3.5 => (first + second, third),
+            _ => (first + second + third, 0.0),
+        };
         before + now * ((time - middle) / lasts + 0.5).clamp(0.0, 1.0)
     }
 
@@ -229,9 +234,9 @@ mod tests {
             shifts: (shifts, 3.0, 0.1),
         };
         let ends = |recording, shifts| [0.0, 9.0].map(|time| course(recording, shifts).at(time));
-        let each = |shifts| [1.0, 2.0, 3.0].map(|recording| ends(recording, shifts));
-        assert_eq!(each([0.25, 0.0, 0.0]), [[0.5, 0.75], [0.75, 0.75], [0.75, 0.75]]);
-        assert_eq!(each([0.0, 0.25, 0.0]), [[0.5, 0.5], [0.5, 0.75], [0.75, 0.75]]);
-        assert_eq!(each([0.0, 0.0, -0.25]), [[0.5, 0.5], [0.5, 0.5], [0.5, 0.25]]);
+        let each = |shifts| [1.0, 2.0, 3.0, 4.0].map(|recording| ends(recording, shifts));
+        assert_eq!(each([0.25, 0.0, 0.0]), [[0.5, 0.75], [0.75, 0.75], [0.75, 0.75], [0.75, 0.75]]);
+        assert_eq!(each([0.0, 0.25, 0.0]), [[0.5, 0.5], [0.5, 0.75], [0.75, 0.75], [0.75, 0.75]]);
+        assert_eq!(each([0.0, 0.0, -0.25]), [[0.5, 0.5], [0.5, 0.5], [0.5, 0.25], [0.25, 0.25]]);
     }
 }

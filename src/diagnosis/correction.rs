@@ -83,8 +83,7 @@ pub fn correction(bench: &Bench, extended: &Parameters) -> Option<Correction> {
     let (_, penalty, linear) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let parameters = fitted(bench, linear, penalty);
     let held_out = |parameters: &Parameters| {
-        let errors = bench.data.held_out_rms(&bench.data.residuals(parameters)?);
-        Some(errors.iter().map(|(signal, rms)| (rms / bench.data.noise(*signal).level).powi(2)).sum::<f64>().sqrt())
+        Some(bench.data.weighted(&bench.data.held_out_rms(&bench.data.residuals(parameters)?)))
     };
     let improvement = 1.0 - held_out(&parameters)? / held_out(extended)?;
     let UnknownCause { acts_on, first, second, .. } = parameters.unknown_cause;

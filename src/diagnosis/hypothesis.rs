@@ -310,8 +310,8 @@ pub fn corrections(nominal: &Parameters, tolerance: f64, off: Off) -> Vec<(&'sta
         let size = share * tolerance * start.abs();
         // The deviation of a uniform distribution over the tolerance.
         let prior = Some((start, size / 3.0_f64.sqrt()));
-        let bounds = Free { start, lower: start - size, upper: start + size, typical: size, prior };
-        (size > 0.0).then_some((variable, bounds))
+        let (lower, upper) = ((start - size).max(variable.min), (start + size).min(variable.max));
+        (size > 0.0).then_some((variable, Free { start, lower, upper, typical: size, prior }))
     });
     let shapes = shapes.iter().map(|(name, share)| {
         let (variable, start) = declared(nominal, name);
@@ -351,7 +351,7 @@ mod tests {
 
     #[test]
     fn what_is_held_is_neither_free_in_a_form_nor_as_a_refinement() {
-        let effect = Effects::DESCRIPTIONS.iter().find(|effect| effect.name == "leakage").unwrap();
+        let effect = Effects::description("leakage").unwrap();
         let form =
             effect.all_forms().position(|form| form.iter().any(|(name, _)| *name == "leakage.choked_share")).unwrap();
         let refined =

@@ -165,7 +165,7 @@ impl Variable {
             Self::PressureRate => rate(Signal::GaugePressure),
             Self::Command => recording.bridged(Signal::Command),
             Self::CommandRate => rate(Signal::Command),
-            Self::Time => Some(recording.time.clone()),
+            Self::Time => Some(recording.since_start()),
         }
     }
 
@@ -222,7 +222,7 @@ impl<'a> Chain<'a> {
             let force = weighing * GRAVITY + moving * motion.curvature;
             (contraction, force)
         });
-        let time = self.since_start();
+        let time = self.recording.since_start();
         let shown = needed.zip(&time).map(|((contraction, force), time)| {
             effects.readings(Readings { time: *time, contraction: *contraction, gauge_pressure: 0.0, force }).force
         });
@@ -246,15 +246,9 @@ impl<'a> Chain<'a> {
     fn true_contraction(&self) -> Option<Vec<f64>> {
         let readings = self.recording.bridged(Signal::Contraction)?;
         let pull = self.recording.bridged(Signal::Force).unwrap_or_else(|| vec![0.0; readings.len()]);
-        let all = readings.into_iter().zip(pull).zip(self.since_start());
+        let all = readings.into_iter().zip(pull).zip(self.recording.since_start());
         let effects = &self.parameters.effects;
         Some(all.map(|((reading, pull), time)| effects.true_contraction(reading, pull, time)).collect())
-    }
-
-    /// Times of the samples in s since the start.
-    fn since_start(&self) -> Vec<f64> {
-        let time = &self.recording.time;
-        time.iter().map(|now| now - time[0]).collect()
     }
 }
 
@@ -284,17 +278,26 @@ pub fn most_telling<'a>(
 /// out.
 fn dependence(residual: &[f64], variable: &[f64], bins: usize) -> f64 {
     let both = variable.iter().copied().zip(residual.iter().copied());
-    let mut pairs: Vec<(f64, f64)> = both.filter(|(x, r)| x.is_finite() && r.is_finite()).collect();
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = pairs.iter().map(|(_, r)| r * r).sum();
+    let (values, residuals): (Vec<f64>, Vec<f64>) = both.filter(|(x, r)| x.is_finite() && r.is_finite()).unzip();
+    let total: f64 = residuals.iter().map(|r| r * r).sum();
     if total == 0.0 {
         return 0.0;
     }
-    let taken_off = pairs.chunks(pairs.len().div_ceil(bins)).map(|class| {
-        let sum: f64 = class.iter().map(|(_, r)| r).sum();
-        sum * sum / class.len() as f64
-    });
+    let mut classes = vec![(0.0, 0.0); bins];
+    for (class, residual) in binned(&values, bins).into_iter().zip(residuals) {
+        let (sum, count) = &mut classes[class];
+        (*sum, *count) = (*sum + residual, *count + 1.0);
+    }
+    let taken_off = classes.into_iter().filter(|(_, count)| *count > 0.0).map(|(sum, count)| sum * sum / count);
     taken_off.sum::<f64>() / total
+}
+
+/// Number of the bin of each value, below `bins`; bins hold about equally many values, and equal values share one.
+pub fn binned(values: &[f64], bins: usize) -> Vec<usize> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let edges: Vec<f64> = (1..bins).map(|k| sorted[k * sorted.len() / bins]).collect();
+    values.iter().map(|value| edges.partition_point(|edge| edge <= value)).collect()
 }
 
 /// Mean square of the samples that are there; `None` where there are none.
@@ -400,6 +403,22 @@ mod tests {
 
     fn rms(values: &[f64]) -> f64 {
         mean_square(values).unwrap().sqrt()
+    }
+
+    #[test]
+    fn equal_values_share_a_bin_and_others_are_spread() {
+        assert_eq!(binned(&[0.0, 0.0, 0.0, 0.0, 1.0, 2.0], 3), [1, 1, 1, 1, 2, 2]);
+        assert_eq!(binned(&[3.0, 1.0, 2.0], 3), [2, 0, 1]);
+    }
+
+    #[test]
+    fn what_drifts_under_a_constant_command_does_not_go_with_it() {
+        let drift: Vec<f64> = (0..1000).map(|k| (-0.01 * f64::from(k % 250)).exp() - 0.4).collect();
+        let stairs: Vec<f64> = (0..1000).map(|k| f64::from(k / 250)).collect();
+        let level = drift[..250].iter().sum::<f64>() / 250.0;
+        let of_level = level.powi(2) / mean_square(&drift).unwrap();
+        assert!((dependence(&drift, &stairs, 20) - of_level).abs() < 1e-12);
+        assert!(dependence(&drift, &[1.0; 1000], 20) < of_level + 1e-12);
     }
 
     #[test]

@@ -28,14 +28,12 @@ use crate::Result;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality;
-use crate::simulation::replay;
 use crate::variables::Declared;
 use fits::{Bench, Fitted};
 use hypothesis::{Off, Part, tells_apart};
 use residuals::{Data, Scope};
 use selection::{Chosen, Judged, MOST_EFFECTS};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use unlisted::Shown;
 use ways::Way;
 
@@ -84,6 +82,9 @@ pub struct Cause {
     pub experiment: &'static str,
 }
 
+/// What is told the effects that are at work in a fit.
+pub type Fitting<'f> = dyn Fn(&str) + Sync + 'f;
+
 /// Parameters with their values, SI.
 pub type Values = Vec<(&'static str, f64)>;
 
@@ -120,7 +121,7 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Relative error of the nominal coefficients below which nothing was called wrong.
     pub tolerance: f64,
-    /// The causes, the largest first.
+    /// The causes, in the order in which they were found: each explains most of what those before leave.
     pub causes: Vec<Cause>,
     /// Errors per signal.
     pub signals: Vec<SignalErrors>,
@@ -147,8 +148,8 @@ pub struct Diagnosis {
 
 /// Diagnoses recordings against a nominal model.
 ///
-/// `tolerance` is the relative error of the nominal coefficients below which nothing is called wrong; `done` is told
-/// after each of the `1 + candidates` fits, of which there may be two rounds. What is set anew in each recording is
+/// `tolerance` is the relative error of the nominal coefficients below which nothing is called wrong; `fitting` is told, before each fit,
+/// the effects that are at work in it: how many there will be nobody knows. What is set anew in each recording is
 /// found where these are [`numbered`](crate::measurement::numbered).
 ///
 /// # Errors
@@ -157,14 +158,11 @@ pub fn diagnose(
     nominal: &Parameters,
     recordings: &[Recording],
     tolerance: f64,
-    done: &(dyn Fn(&str) + Sync),
+    fitting: &Fitting<'_>,
 ) -> Result<Diagnosis> {
     let notes = quality::notes(recordings, nominal)?;
-    for recording in recordings {
-        replay(nominal, recording)?; // a model that cannot be simulated at all is the user's to mend
-    }
     let cannot_follow = || residuals::cannot_follow(recordings);
-    let data = Data::new(recordings, nominal, tolerance)?;
+    let data = Data::new(recordings, nominal, tolerance)?; // a model that cannot be simulated at all is the user's to mend
     let thinned = thinned(recordings);
     let prepared = |off: &Off| {
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
@@ -173,8 +171,8 @@ pub fn diagnose(
         Way::new(Bench::new(for_fits, nominal, tolerance, *off), *off == Off::most(nominal)).ok_or_else(cannot_follow)
     };
     let found = match Off::ways(nominal) {
-        [narrow, wide] => ways::better(prepared(narrow)?, || prepared(wide), done)?,
-        ways => prepared(&ways[0])?.searched(MOST_EFFECTS, done),
+        [narrow, wide] => ways::better(prepared(narrow)?, || prepared(wide), fitting)?,
+        ways => prepared(&ways[0])?.searched(MOST_EFFECTS, fitting),
     }
     .ok_or_else(cannot_follow)?;
     answer(found.bench(), data, nominal, &found.chosen, notes).ok_or_else(cannot_follow)
@@ -209,15 +207,11 @@ fn answer(
     let nominal_errors = data.held_out_rms(&nominal_residuals);
     let mut extended = chosen.model.parameters;
     let mut extended_errors = data.held_out_rms(&left);
-    let weighted = |errors: &BTreeMap<Signal, f64>| {
-        let squares = errors.iter().map(|(signal, rms)| (rms / data.noise(*signal).level).powi(2));
-        squares.sum::<f64>().sqrt()
-    };
     // Corrections that do not help on unseen samples are not made.
-    if !chosen.names_causes() && weighted(&extended_errors) > weighted(&nominal_errors) {
+    if !chosen.names_causes() && data.weighted(&extended_errors) > data.weighted(&nominal_errors) {
         (extended, extended_errors, left) = (*nominal, nominal_errors.clone(), nominal_residuals);
     }
-    let (before, after) = (weighted(&nominal_errors), weighted(&extended_errors));
+    let (before, after) = (data.weighted(&nominal_errors), data.weighted(&extended_errors));
     let signals = nominal_errors.iter().map(|(signal, nominal_rms)| SignalErrors {
         signal: *signal,
         nominal_rms: *nominal_rms,
@@ -271,7 +265,7 @@ fn of_several(chosen: &Chosen, recordings: &[Recording]) -> Option<String> {
     (!numbers.is_empty()).then_some(text)
 }
 
-/// The causes as they are told, the largest first.
+/// The causes as they are told, in the order in which they were found.
 fn causes(chosen: &Chosen, nominal: &Parameters, parameters: &[FittedParameter]) -> Vec<Cause> {
     let parts = chosen.model.hypothesis.parts.iter().zip(&chosen.alternatives);
     let causes = parts.map(|(part, alternatives)| {

@@ -1,5 +1,6 @@
 //! What the error that is left depends on: for causes without a name, and for the rest of those that have one.
 
+use super::links::binned;
 use super::residuals::Data;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
@@ -86,7 +87,7 @@ fn variables(
         .iter()
         .map(|v| v.as_ref().map(|v| v.iter().map(|v| if v.abs() < AT_REST { 0.0 } else { v.signum() }).collect()))
         .collect();
-    let time = recordings.iter().map(|recording| Some(recording.time.clone())).collect::<Vec<_>>();
+    let time = recordings.iter().map(|recording| Some(recording.since_start())).collect::<Vec<_>>();
     let mass = recordings.iter().map(|r| r.load_mass().map(|mass| vec![mass; r.time.len()])).collect::<Vec<_>>();
     let columns = [
         ("the command", signal(Signal::Command)),
@@ -104,14 +105,6 @@ fn variables(
         values.map(|values| Variable { name, values })
     });
     at_samples.collect()
-}
-
-/// Number of the bin of each value; bins hold about equally many values, and equal values share one.
-fn binned(values: &[f64], bins: usize) -> Vec<usize> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let edges: Vec<f64> = (1..bins).map(|k| sorted[k * sorted.len() / bins]).collect();
-    values.iter().map(|value| edges.partition_point(|edge| edge <= value)).collect()
 }
 
 /// Share of the mean square of held-out residuals that the bin means of the others take off.
@@ -137,12 +130,6 @@ fn share(samples: &[(usize, usize, f64, bool)], bins: &[usize]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn equal_values_share_a_bin_and_others_are_spread() {
-        assert_eq!(binned(&[0.0, 0.0, 0.0, 0.0, 1.0, 2.0], 3), [1, 1, 1, 1, 2, 2]);
-        assert_eq!(binned(&[3.0, 1.0, 2.0], 3), [2, 0, 1]);
-    }
 
     #[test]
     fn the_share_is_what_was_put_in() {

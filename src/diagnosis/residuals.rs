@@ -11,6 +11,7 @@ use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::path::PathBuf;
 
 /// Share of each recording, from its start, that fits see; the rest is held out.
 const TRAINING_SHARE: f64 = 0.6;
@@ -100,20 +101,20 @@ pub struct HeldOut {
     pub recording: String,
     /// Time in s from which on they do not.
     pub from: f64,
-    /// Whether that is where it starts.
-    pub is_whole: bool,
 }
 
 impl std::fmt::Display for HeldOut {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { recording, from, is_whole } = self;
-        if *is_whole { write!(f, "{recording}") } else { write!(f, "{recording} from {from:.1} s") }
+        write!(f, "{} from {:.1} s", self.recording, self.from)
     }
 }
 
 /// Recordings whose simulation gives nothing to compare.
 pub fn cannot_follow(recordings: &[Recording]) -> Error {
-    let problem = "the model cannot follow the recording: check `load_mass` and the units".to_owned();
+    let of_load =
+        if recordings.iter().any(|recording| recording.load_mass().is_some()) { "`load_mass` and " } else { "" };
+    let names: Vec<_> = recordings.iter().map(Recording::name).collect();
+    let problem = format!("the model cannot follow {}: check {of_load}the units", names.join(" or "));
     Error::Recording { path: recordings[0].path.clone(), problem }
 }
 
@@ -121,8 +122,14 @@ impl<'a> Data<'a> {
     /// Looks at recordings before any fit.
     ///
     /// # Errors
-    /// [`Error::Recording`] where a recording is too short, no measured signal can be judged, or the model cannot follow.
+    /// [`Error::Recording`] where there is none, one is too short, no measured signal can be judged, or the model cannot follow.
     pub fn new(recordings: &'a [Recording], nominal: &Parameters, tolerance: f64) -> Result<Self> {
+        if recordings.is_empty() {
+            return Err(Error::Recording {
+                path: PathBuf::new(),
+                problem: "there is no recording to diagnose".to_owned(),
+            });
+        }
         if let Some(short) = recordings.iter().find(|recording| recording.time.len() < FEWEST_SAMPLES) {
             let problem = format!("too short for a diagnosis: it takes at least {FEWEST_SAMPLES} samples");
             return Err(Error::Recording { path: short.path.clone(), problem });
@@ -232,12 +239,8 @@ impl<'a> Data<'a> {
 
     /// The parts of recordings that are held out.
     pub fn held_out(&self) -> Vec<HeldOut> {
-        let parts = self.recordings.iter().zip(&self.held_out_from).filter(|(r, from)| r.time.last() > Some(from));
-        let part = |(recording, from): (&Recording, &f64)| {
-            let start = recording.time[0];
-            HeldOut { recording: recording.name(), from: from.max(start), is_whole: *from <= start }
-        };
-        parts.map(part).collect()
+        let parts = self.recordings.iter().zip(&self.held_out_from);
+        parts.map(|(recording, from)| HeldOut { recording: recording.name(), from: *from }).collect()
     }
 
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
@@ -428,8 +431,8 @@ impl<'a> Data<'a> {
     pub fn goes_with_inputs(&self, model: &Parameters, effect: &str) -> bool {
         let goes = |recording: &Recording| {
             let effects = in_recording(model, recording).effects;
-            let own = recording.time.iter().map(|time| effects.own_course(effect, time - recording.time[0]));
-            let course: Vec<f64> = own.collect();
+            let course: Vec<f64> =
+                recording.since_start().into_iter().map(|time| effects.own_course(effect, time)).collect();
             let input = recording.get(Signal::Command).or_else(|| recording.get(Signal::GaugePressure));
             let is_driven = |input: &[f64]| correlation(&course, input).powi(2) > MOST_OF_VARIANCE;
             course.iter().any(|value| *value != course[0]).then(|| input.is_some_and(is_driven))
@@ -448,10 +451,9 @@ impl<'a> Data<'a> {
         let mut first = 0;
         let mut numbers = Vec::with_capacity(self.recordings.len());
         for recording in self.recordings {
-            let start = recording.time[0];
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let of_recording: Vec<usize> =
-                recording.time.iter().map(|time| first + ((time - start) / BLOCK) as usize).collect();
+                recording.since_start().into_iter().map(|time| first + (time / BLOCK) as usize).collect();
             first = of_recording.last().map_or(first, |last| last + 1);
             numbers.push(of_recording);
         }
@@ -470,6 +472,11 @@ impl<'a> Data<'a> {
         sums.into_iter()
             .map(|(signal, (sum, count))| (signal, self.noise[&signal].level * (sum / count).sqrt()))
             .collect()
+    }
+
+    /// Errors of all signals together, each in units of its noise.
+    pub fn weighted(&self, errors: &BTreeMap<Signal, f64>) -> f64 {
+        errors.iter().map(|(signal, rms)| (rms / self.noise[signal].level).powi(2)).sum::<f64>().sqrt()
     }
 
     fn is_in(&self, scope: Scope, segment: &Segment, sample: usize) -> bool {

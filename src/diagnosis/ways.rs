@@ -1,6 +1,7 @@
 //! How the coefficients of a nominal muscle are off decides what is an effect: off as a whole, most muscles show small ones; coefficients
 //! that are each off by themselves can stand for many. Bayes' rule weighs both.
 
+use super::Fitting;
 use super::fits::{Bench, Fitted};
 use super::hypothesis::{Hypothesis, neutralised};
 use super::residuals::Scope;
@@ -34,10 +35,9 @@ impl<'a> Way<'a> {
         !is_unsound(&self.baseline.losses, &self.bench.data)
     }
 
-    /// Looks for at most so many effects; `done` is told after the nominal model and each candidate. `None` where a model cannot be simulated.
-    pub fn searched(self, most: usize, done: &(dyn Fn(&str) + Sync)) -> Option<Found<'a>> {
-        done("nominal");
-        let mut search = Search::new(self.bench, self.baseline, self.allows_most, done);
+    /// Looks for at most so many effects; `fitting` is told those of each fit. `None` where a model cannot be simulated.
+    pub fn searched(self, most: usize, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
+        let mut search = Search::new(self.bench, self.baseline, self.allows_most, fitting);
         let chosen = search.up_to(most)?;
         Some(Found { search, chosen })
     }
@@ -51,17 +51,17 @@ impl<'a> Way<'a> {
 pub fn better<'a>(
     narrow: Way<'a>,
     wide: impl Fn() -> Result<Way<'a>>,
-    done: &(dyn Fn(&str) + Sync),
+    fitting: &'a Fitting<'a>,
 ) -> Result<Option<Found<'a>>> {
     let at_once = if narrow.says_all() { None } else { Some(wide()?) };
     // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
     let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
-    let Some(mut found) = narrow.searched(most.min(AT_FIRST), done) else { return Ok(None) };
+    let Some(mut found) = narrow.searched(most.min(AT_FIRST), fitting) else { return Ok(None) };
     if found.finds_nothing() {
         return Ok(Some(found));
     }
     let wide = at_once.map_or_else(wide, Ok)?;
-    let Some(mut other) = wide.searched(found.most_beside().min(AT_FIRST), done) else { return Ok(None) };
+    let Some(mut other) = wide.searched(found.most_beside().min(AT_FIRST), fitting) else { return Ok(None) };
     // A third one takes minutes to find, and none is missing where two say all.
     if !other.says_all() {
         found.up_to(most);

@@ -1,4 +1,5 @@
-use super::{Description, Effect, Holds, REFERENCE_CONTRACTION, Readings, scaled, settled, told_settling, unscaled};
+use super::{Description, Effect, Holds, REFERENCE_CONTRACTION, Readings};
+use crate::scale::{Scale, settled};
 
 crate::variables::variables! {
     /// A position sensor whose scale is off.
@@ -24,6 +25,19 @@ crate::variables::variables! {
         settling: f64 = 0.0, ONE, (-0.3..=0.3);
         /// Time constant of the settling
         settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
+    }
+}
+
+impl ContractionSensorGain {
+    fn scale(&self) -> Scale {
+        let Self { relative_error, bend, settling, settling_time } = *self;
+        Scale {
+            middle: REFERENCE_CONTRACTION,
+            relative_error,
+            bend,
+            curvature: 0.0,
+            settling: (settling, settling_time),
+        }
     }
 }
 
@@ -53,7 +67,7 @@ impl Effect for ContractionSensorGain {
         &["contraction_sensor_gain.bend", "contraction_sensor_gain.settling", "contraction_sensor_gain.settling_time"];
 
     fn is_neutral(&self) -> bool {
-        [self.relative_error, self.bend, self.settling] == [0.0; 3]
+        self.scale().is_neutral()
     }
 
     fn own_course(&self, time: f64) -> f64 {
@@ -61,18 +75,14 @@ impl Effect for ContractionSensorGain {
     }
 
     fn readings(&self, readings: Readings) -> Readings {
-        let error = self.relative_error + self.own_course(readings.time);
-        Readings { contraction: scaled(readings.contraction, error, self.bend, REFERENCE_CONTRACTION), ..readings }
+        Readings { contraction: self.scale().shown(readings.contraction, readings.time), ..readings }
     }
 
     fn true_contraction(&self, reading: f64, _force: f64, time: f64) -> f64 {
-        unscaled(reading, self.relative_error + self.own_course(time), self.bend, REFERENCE_CONTRACTION)
+        self.scale().behind(reading, time)
     }
 
     fn sentence(&self) -> String {
-        let word = if self.relative_error < 0.0 { "less" } else { "more" };
-        let percent = 100.0 * self.relative_error.abs();
-        let warms = told_settling((self.settling, self.settling_time));
-        format!("The position sensor shows {percent:.1} % {word} than there is{warms}.")
+        format!("The position sensor shows {}.", self.scale().told("0.1 m"))
     }
 }

@@ -4,7 +4,7 @@ crate::variables::variables! {
     /// Creep: the membrane gives way slowly, or settles into the braid slowly.
     ///
     /// # Model
-    /// The membrane feels x − d₁ − d₂ + n (a₁ + a₂) x, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
+    /// Braid and membrane feel x − d₁ − d₂ + n (a₁ + a₂) x, with τᵢ ddᵢ/dt + dᵢ = aᵢ (x − x_r): two Kelvin–Voigt elements in series with it,
     /// `amplitude_1`, `time_1`, `amplitude_2`, `time_2`. x_r = `relaxed_share` x(0) is the contraction at which nothing drifts, and
     /// dᵢ(0) = `settled_share` aᵢ (x(0) − x_r). The nominal coefficients have the share n of all drift from the rest length already,
     /// `nominal_share`: all of it if they are those of a muscle that was held for long. The pressure pulls by d_F more, with

@@ -1,4 +1,5 @@
-use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, by_curvature, of_recording, scaled, told_anew};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE, of_recording, told_anew};
+use crate::scale::Scale;
 
 /// Relative error below which nothing would be left of the muscle.
 const LEAST: f64 = -0.9;
@@ -89,7 +90,10 @@ impl Effect for ForceGain {
         if self.is_neutral() {
             return force;
         }
-        scaled(force, self.error() + by_curvature(force, self.curvature, REFERENCE_FORCE), self.bend, REFERENCE_FORCE)
+        let Self { bend, curvature, .. } = *self;
+        let scale =
+            Scale { middle: REFERENCE_FORCE, relative_error: self.error(), bend, curvature, ..Scale::default() };
+        scale.shown(force, 0.0)
     }
 
     fn sentence(&self) -> String {

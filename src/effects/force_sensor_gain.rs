@@ -1,4 +1,5 @@
-use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings, by_curvature, scaled, settled, told_settling};
+use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings};
+use crate::scale::{Scale, settled};
 
 crate::variables::variables! {
     /// A force sensor whose scale is off.
@@ -27,6 +28,13 @@ crate::variables::variables! {
         settling: f64 = 0.0, ONE, (-0.3..=0.3);
         /// Time constant of the settling
         settling_time: f64 = 10.0, SECOND, (0.5..=1000.0);
+    }
+}
+
+impl ForceSensorGain {
+    fn scale(&self) -> Scale {
+        let Self { relative_error, bend, curvature, settling, settling_time } = *self;
+        Scale { middle: REFERENCE_FORCE, relative_error, bend, curvature, settling: (settling, settling_time) }
     }
 }
 
@@ -60,7 +68,7 @@ impl Effect for ForceSensorGain {
     ];
 
     fn is_neutral(&self) -> bool {
-        [self.relative_error, self.bend, self.curvature, self.settling] == [0.0; 4]
+        self.scale().is_neutral()
     }
 
     fn own_course(&self, time: f64) -> f64 {
@@ -68,15 +76,10 @@ impl Effect for ForceSensorGain {
     }
 
     fn readings(&self, readings: Readings) -> Readings {
-        let curved = by_curvature(readings.force, self.curvature, REFERENCE_FORCE);
-        let error = self.relative_error + curved + self.own_course(readings.time);
-        Readings { force: scaled(readings.force, error, self.bend, REFERENCE_FORCE), ..readings }
+        Readings { force: self.scale().shown(readings.force, readings.time), ..readings }
     }
 
     fn sentence(&self) -> String {
-        let word = if self.relative_error < 0.0 { "less" } else { "more" };
-        let percent = 100.0 * self.relative_error.abs();
-        let warms = told_settling((self.settling, self.settling_time));
-        format!("The force sensor shows {percent:.1} % {word} than there is{warms}.")
+        format!("The force sensor shows {}.", self.scale().told("400 N"))
     }
 }

@@ -158,6 +158,10 @@ impl Effect for FrictionHysteresis {
         self.half_width == 0.0 && self.half_width_per_pressure == 0.0 && self.half_width_per_pull == 0.0
     }
 
+    fn rests(&self) -> bool {
+        self.is_neutral() || self.smoothing_velocity > 0.0
+    }
+
     // What gives way over such a way is a spring.
     fn is_plausible(&self) -> bool {
         self.second_share == 0.0 || self.presliding_displacement * self.second_ratio < LONGEST

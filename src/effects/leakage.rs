@@ -163,12 +163,16 @@ impl Effect for Leakage {
             tiny => format!("{tiny:.2} Pa"),
         };
         let at_rest_length = told(self.loss(REFERENCE_PRESSURE, 0.0));
+        let shuts = match self.shut_after {
+            0.0 => String::new(),
+            after => format!("; its valve shuts {after:.1} s after the command came to rest"),
+        };
         if self.opening_with_contraction == 0.0 && self.volume_growth == 0.0 {
-            return format!("The muscle leaks: at 2 bar it loses {at_rest_length} per second.");
+            return format!("The muscle leaks: at 2 bar it loses {at_rest_length} per second{shuts}.");
         }
         let contracted = told(self.loss(REFERENCE_PRESSURE, TOLD_CONTRACTION));
         format!(
-            "The muscle leaks: at 2 bar it loses {at_rest_length} per second at its rest length and {contracted} at {:.0} cm of contraction.",
+            "The muscle leaks: at 2 bar it loses {at_rest_length} per second at its rest length and {contracted} at {:.0} cm of contraction{shuts}.",
             100.0 * TOLD_CONTRACTION
         )
     }

@@ -52,45 +52,15 @@ pub const REFERENCE_FORCE: f64 = 400.0;
 /// Ambient pressure in Pa, for what depends on absolute pressure.
 pub const AMBIENT_PRESSURE: f64 = 1e5;
 
-/// A value on a scale that is off by a share, and bent: by so much more at twice the middle of the scale.
-fn scaled(value: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
-    value * (1.0 + relative_error + bend * (value / middle - 1.0))
-}
-
-/// What the curvature of a scale adds to its relative error: nothing at the middle of the scale, three times the curvature at twice that.
-fn by_curvature(value: f64, curvature: f64, middle: f64) -> f64 {
-    curvature * ((value / middle).powi(2) - 1.0)
-}
-
 /// (eʳᵃ − 1)/(eʳᵇ − 1): how far an exponential of a rate r has come at a, relative to b; a straight line for none.
 fn exponential(rate: f64, at: f64, reference: f64) -> f64 {
     let rate = not_zero(rate);
     (rate * at).exp_m1() / (rate * reference).exp_m1()
 }
 
-/// What is left at a time in s of an excess at the start that settles with a time constant in s; before the start all of it.
-#[inline]
-pub(crate) fn settled((excess, constant): (f64, f64), time: f64) -> f64 {
-    if excess == 0.0 { 0.0 } else { excess * (-time.max(0.0) / constant).exp() }
-}
-
-/// What follows a sentence about a scale that settles so.
-fn told_settling((excess, constant): (f64, f64)) -> String {
-    if excess == 0.0 {
-        return String::new();
-    }
-    format!(", {:+.1} % on top at the start, which settle within {constant:.1} s", 100.0 * excess)
-}
-
 /// The rate of an exponential: nearer to zero the differences from one are those of rounding.
 fn not_zero(rate: f64) -> f64 {
     rate.abs().max(1e-6).copysign(rate)
-}
-
-/// The value that [`scaled`] made a reading of: the root of a quadratic that is near to the reading.
-fn unscaled(reading: f64, relative_error: f64, bend: f64, middle: f64) -> f64 {
-    let slope = 1.0 + relative_error - bend;
-    2.0 * reading / (slope + (slope * slope + 4.0 * bend / middle * reading).max(0.0).sqrt())
 }
 
 /// By how much a value is more in the recording with a number from 1, given that for the second and the third; in all others by nothing.
@@ -271,7 +241,8 @@ pub trait Effect: Declared + Default {
         rate
     }
 
-    // From here to the static force nothing may depend on the velocity: what a cable's end finds is how the muscle's loss does.
+    // Nothing from here to the static force may depend on the velocity: behind a cable this part is computed once, and the velocity at its end
+    // is then looked for.
 
     /// Gauge pressure in Pa that drives the muscle.
     fn effective_pressure(&self, _at: &Point, pressure: f64) -> f64 {
@@ -654,13 +625,14 @@ macro_rules! effects {
     };
 }
 
-// One line per effect: adding one is its file and a line here. In the order of the signal.
+// One line per effect: adding one is its file and a line here. In the order of the signal: the ports of the valve act behind its poles, and
+// what stretches does so by the true pull, whatever a warm sensor shows of it.
 effects! {
-    valve_dead_band: ValveDeadBand;
     valve_dead_time: ValveDeadTime;
     valve_gain: ValveGain;
     valve_offset: ValveOffset;
     valve_lag: ValveLag;
+    valve_dead_band: ValveDeadBand;
     supply_saturation: SupplySaturation;
     valve_resonance: ValveResonance;
     flow_limit: FlowLimit;
@@ -668,13 +640,13 @@ effects! {
     threshold_pressure: ThresholdPressure;
     end_effects: EndEffects;
     creep: Creep;
+    series_elasticity: SeriesElasticity;
     temperature_drift: TemperatureDrift;
     bladder_stiffness: BladderStiffness;
     force_gain: ForceGain;
     friction_hysteresis: FrictionHysteresis;
     viscous_damping: ViscousDamping;
     payload_mass: PayloadMass;
-    series_elasticity: SeriesElasticity;
     contraction_sensor_gain: ContractionSensorGain;
     contraction_sensor_offset: ContractionSensorOffset;
     contraction_sensor_delay: ContractionSensorDelay;
@@ -685,6 +657,11 @@ effects! {
 }
 
 impl Effects {
+    /// What the effect with this name is.
+    pub fn description(name: &str) -> Option<&'static Description> {
+        Self::DESCRIPTIONS.iter().find(|effect| effect.name == name)
+    }
+
     /// Usual sizes of the states of a plant: those of its own states, then those of the effects.
     pub(crate) const fn scales<const N: usize>(own: &[f64]) -> [f64; N] {
         let mut all = [1.0; N];
@@ -707,20 +684,7 @@ impl Effects {
 
 #[cfg(test)]
 mod tests {
-    use super::{Effects, Readings};
-
-    #[test]
-    fn a_curved_scale_is_a_cubic_through_its_error_at_the_middle() {
-        let mut effects = Effects::default();
-        let own = &mut effects.force_sensor_gain;
-        (own.relative_error, own.bend, own.curvature) = (-0.06, 0.01, -0.02);
-        // F = r 400 N reads 400 (r (1 − 0.06 − 0.01 + 0.02) + 0.01 r² − 0.02 r³).
-        for (ratio, reading) in [(0.0, 0.0), (0.5, 190.0), (1.0, 376.0), (2.0, 712.0)] {
-            let force = 400.0 * ratio;
-            let shown = effects.readings(Readings { time: 0.0, contraction: 0.0, gauge_pressure: 0.0, force });
-            assert!((shown.force - reading).abs() < 1e-9, "{ratio}: {}", shown.force);
-        }
-    }
+    use super::Effects;
 
     #[test]
     fn what_ends_at_a_bound_is_no_cause_but_for_limits_of_nature() {

@@ -1,4 +1,5 @@
-use super::{Description, Effect, Holds, REFERENCE_PRESSURE, Readings, scaled, settled, told_settling, unscaled};
+use super::{Description, Effect, Holds, REFERENCE_PRESSURE, Readings};
+use crate::scale::{Scale, settled};
 
 crate::variables::variables! {
     /// A pressure sensor whose scale is off.
@@ -28,6 +29,13 @@ crate::variables::variables! {
     }
 }
 
+impl PressureSensorGain {
+    fn scale(&self) -> Scale {
+        let Self { relative_error, bend, settling, settling_time } = *self;
+        Scale { middle: REFERENCE_PRESSURE, relative_error, bend, curvature: 0.0, settling: (settling, settling_time) }
+    }
+}
+
 impl Effect for PressureSensorGain {
     const DESCRIPTION: Description = Description {
         name: "pressure_sensor_gain",
@@ -54,7 +62,7 @@ impl Effect for PressureSensorGain {
         &["pressure_sensor_gain.bend", "pressure_sensor_gain.settling", "pressure_sensor_gain.settling_time"];
 
     fn is_neutral(&self) -> bool {
-        [self.relative_error, self.bend, self.settling] == [0.0; 3]
+        self.scale().is_neutral()
     }
 
     fn own_course(&self, time: f64) -> f64 {
@@ -62,18 +70,14 @@ impl Effect for PressureSensorGain {
     }
 
     fn readings(&self, readings: Readings) -> Readings {
-        let error = self.relative_error + self.own_course(readings.time);
-        Readings { gauge_pressure: scaled(readings.gauge_pressure, error, self.bend, REFERENCE_PRESSURE), ..readings }
+        Readings { gauge_pressure: self.scale().shown(readings.gauge_pressure, readings.time), ..readings }
     }
 
     fn true_pressure(&self, reading: f64, time: f64) -> f64 {
-        unscaled(reading, self.relative_error + self.own_course(time), self.bend, REFERENCE_PRESSURE)
+        self.scale().behind(reading, time)
     }
 
     fn sentence(&self) -> String {
-        let word = if self.relative_error < 0.0 { "less" } else { "more" };
-        let percent = 100.0 * self.relative_error.abs();
-        let warms = told_settling((self.settling, self.settling_time));
-        format!("The pressure sensor shows {percent:.1} % {word} than there is{warms}.")
+        format!("The pressure sensor shows {}.", self.scale().told("2 bar"))
     }
 }

@@ -24,7 +24,7 @@ crate::variables::variables! {
     /// # Validity
     /// A supply of constant pressure behind a regulator, or with a droop in proportion to what the muscle lacks, or a tank
     /// that others empty steadily, or one that the muscle itself empties, or one that a compressor fills between two switches while others
-    /// use it steadily.
+    /// use it steadily. Where it is constant at first and that is changed in the course of a simulation, its time counts from that change.
     ///
     /// # Reference
     /// Definition of saturation; droop as in data sheets of pressure regulators (0.5 to 1.75 bar). Two switches: balance of the
@@ -156,6 +156,11 @@ impl Effect for SupplySaturation {
 
     fn is_plausible(&self) -> bool {
         self.span == 0.0 || (1.5..150.0).contains(&self.period)
+    }
+
+    // What was lost stays nothing, and the time does not count.
+    fn rests(&self) -> bool {
+        self.is_neutral() || [self.fall, self.usage, self.span] == [0.0; 3]
     }
 
     fn own_course(&self, time: f64) -> f64 {

@@ -140,6 +140,11 @@ impl Effect for TemperatureDrift {
         self.time_constant > FASTEST && self.deepest() > -MOST_ASTRAY
     }
 
+    // How warm a sensor is goes by time.
+    fn rests(&self) -> bool {
+        [self.area_change, self.elastic_change, self.valve_change] == [0.0; 3]
+    }
+
     fn start(&self, _at: &Point, own: &mut [f64]) {
         own.fill(self.warmth_at_start());
     }

@@ -1,4 +1,5 @@
 use super::{Description, Effect, Holds, Point};
+use std::fmt::Write;
 
 /// Command in V at which the gain is stated when the characteristic is bent: the middle of the usual range.
 const MIDDLE: f64 = 2.0;
@@ -64,6 +65,15 @@ impl Effect for ValveGain {
 
     fn sentence(&self) -> String {
         let word = if self.relative_error < 0.0 { "less" } else { "more" };
-        format!("The valve gives {:.1} % {word} pressure per volt than nominal.", 100.0 * self.relative_error.abs())
+        let mut told =
+            format!("The valve gives {:.1} % {word} pressure per volt than nominal", 100.0 * self.relative_error.abs());
+        if self.bend != 0.0 {
+            let _ = write!(told, " at 2 V, and {:+.2} % for each volt more", 100.0 * self.bend);
+        }
+        if self.slope_change != 0.0 {
+            let _ =
+                write!(told, ", and from {:.1} V on {:+.1} % for what is beyond", self.knee, 100.0 * self.slope_change);
+        }
+        format!("{told}.")
     }
 }

@@ -93,6 +93,10 @@ impl Effect for ValveLag {
         self.time_constant == 0.0 && self.second_time_constant == 0.0 && self.third_time_constant == 0.0
     }
 
+    fn rests(&self) -> bool {
+        self.second_time_constant == 0.0 && self.third_time_constant == 0.0
+    }
+
     /// A delay before the valve does not change where it comes to rest.
     fn at_rest(self) -> Self {
         Self { second_time_constant: 0.0, third_time_constant: 0.0, ..self }

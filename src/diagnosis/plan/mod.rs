@@ -24,7 +24,7 @@ use power::{Bank, Corrections};
 
 /// λ from which two models are told apart beyond doubt: five standard deviations.
 pub const ENOUGH: f64 = 25.0;
-/// Damping and cut-off of the valve are known this much worse than areas: no experiment should hang on them.
+/// The cut-off of the valve is known this much worse than areas, as damping is: no experiment should hang on them.
 const DYNAMIC_SLACK: f64 = 3.0;
 /// Most experiments that are reported, the most promising ones of each kind; their rivals are fitted until one suffices.
 const REPORTED: usize = 8;
@@ -263,13 +263,13 @@ pub fn plan(
     Ok(best.ok_or_else(nothing)?.plan(&bank, task))
 }
 
-/// The corrections, those of coefficients of motion wider.
+/// The corrections, that of the valve's cut-off wider: that of the damping is.
 fn slack(mut corrections: Corrections) -> Corrections {
     for (variable, free) in &mut corrections {
-        if ["muscle.damping", "valve.bandwidth"].contains(&variable.name) {
+        if variable.name == "valve.bandwidth" {
             let start = free.start;
-            (free.lower, free.upper) =
-                (start + DYNAMIC_SLACK * (free.lower - start), start + DYNAMIC_SLACK * (free.upper - start));
+            let [lower, upper] = [free.lower, free.upper].map(|end| start + DYNAMIC_SLACK * (end - start));
+            (free.lower, free.upper) = (lower.max(variable.min), upper.min(variable.max));
             free.prior = free.prior.map(|(mean, deviation)| (mean, DYNAMIC_SLACK * deviation));
         }
     }

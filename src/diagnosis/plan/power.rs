@@ -14,6 +14,7 @@ use super::rivals::Rival;
 use super::{Limits, Place};
 use crate::GRAVITY;
 use crate::diagnosis::hypothesis::{bounds, declared, with_values};
+use crate::effects::ValveResonance;
 use crate::least_squares::{self, Effort, Ended, Free};
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
@@ -323,6 +324,7 @@ fn in_place(model: &Parameters, place: Place) -> Parameters {
     let mut model = *model;
     if place.valve_shut() {
         model.valve.bandwidth = SHUT;
+        model.effects.valve_resonance = ValveResonance::default(); // it would regulate whatever the cut-off is
     }
     model
 }

@@ -1,6 +1,6 @@
 //! What an experiment is to tell apart: models that a diagnosis left standing, or effects at a usual size.
 
-use crate::diagnosis::hypothesis::{declared, with_values};
+use crate::diagnosis::hypothesis::{at_start, count_starts, declared, recordings_for};
 use crate::effects::{Description, Effects};
 use crate::measurement::Signal;
 use crate::parameters::Parameters;
@@ -47,24 +47,20 @@ pub fn usual_noise(signal: Signal) -> f64 {
 
 fn effect(name: &str) -> Result<&'static Description> {
     let known = || Effects::DESCRIPTIONS.iter().map(|effect| effect.name).collect::<Vec<_>>().join(", ");
-    let found = Effects::DESCRIPTIONS.iter().find(|effect| effect.name == name);
-    found.ok_or_else(|| Error::Plan { problem: format!("there is no effect `{name}`; there are {}", known()) })
+    Effects::description(name)
+        .ok_or_else(|| Error::Plan { problem: format!("there is no effect `{name}`; there are {}", known()) })
 }
 
 impl Rival {
     /// An effect at its usual size.
     fn usual(effect: &'static Description, nominal: &Parameters) -> Self {
-        let set = |values: Vec<(&str, f64)>| {
-            values
-                .into_iter()
-                .fold(*nominal, |model, (name, value)| with_values(&model, &[declared(&model, name).0], &[value]))
-        };
-        let variants = effect.forms.iter().flat_map(|form| {
-            let most = form.iter().map(|(_, starts)| starts.len()).max().unwrap_or(0);
-            (0..most).map(move |k| form.iter().map(|(name, starts)| (*name, starts[k.min(starts.len() - 1)])).collect())
-        });
-        let free = effect.forms[0].iter().map(|(name, _)| declared(nominal, name).0).collect();
-        Self { name: effect.name, model: set(effect.typical().collect()), free, variants: variants.map(set).collect() }
+        // A single experiment has no second recording.
+        let forms = effect.forms.iter().filter(|form| form.iter().all(|(name, _)| recordings_for(name) == 1));
+        let variants = forms.flat_map(|form| (0..count_starts(form.iter())).map(|k| at_start(nominal, form.iter(), k)));
+        let usual = effect.forms[0];
+        let free = usual.iter().map(|(name, _)| declared(nominal, name).0).collect();
+        let model = at_start(nominal, usual.iter(), 0);
+        Self { name: effect.name, model, free, variants: variants.collect() }
     }
 
     /// A model as the difference from the nominal one; the parameters of effects are free.
@@ -177,6 +173,11 @@ fn named(json: &Value, path: &Path, nominal: &Parameters) -> Result<Option<Rival
     let ambiguous = |cause: &&&Value| cause["rivals"].as_object().is_some_and(|rivals| !rivals.is_empty());
     let Some(first) = causes.iter().find(ambiguous).or(causes.first()) else { return Ok(None) };
     let beside = path.with_file_name("extended.toml");
+    if !beside.is_file() {
+        let problem =
+            "`extended.toml` must lie beside it: keep the folder together, or run `sinew diagnose` again".to_owned();
+        return Err(Error::Diagnosis { path: path.to_owned(), problem });
+    }
     let model = Parameters::load(&beside.display().to_string())?;
     let names = causes.iter().flat_map(|cause| pairs(&cause["parameters"]));
     let free = names.filter_map(|(name, _)| Some(nominal.find(name)?.0)).collect();

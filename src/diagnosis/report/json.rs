@@ -56,6 +56,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         "signals": signals,
         "improvement": diagnosis.improvement,
         "held_out": held_out(diagnosis),
+        "saw_all": diagnosis.saw_all,
         "separating_experiment": separating_experiment(diagnosis),
         "corrections": parameters(&diagnosis.corrections),
         "correction": diagnosis.correction.as_ref().map(|correction| json!({

@@ -77,7 +77,7 @@ fn which_samples(diagnosis: &Diagnosis) -> &'static str {
 /// The experiment that tells a cause from its alternatives; `None` where none is needed.
 fn separating_experiment(diagnosis: &Diagnosis) -> Option<String> {
     let cause = diagnosis.causes.iter().find(|cause| !cause.alternatives.is_empty())?;
-    let shown_by = |name: &str| Effects::DESCRIPTIONS.iter().find(|e| e.name == name).map(|e| e.experiment);
+    let shown_by = |name: &str| Effects::description(name).map(|effect| effect.experiment);
     let mut experiments = vec![cause.experiment];
     for experiment in cause.alternatives.iter().filter_map(|name| shown_by(name)) {
         if !experiments.contains(&experiment) {

@@ -106,7 +106,7 @@ fn recording_context(recording: &Recording, signals: &[Signal], held_out: Option
         duration => format!("{:.1}", time[samples - 1] - time[0]),
         signals => signals.iter().map(|signal| words(*signal)).collect::<Vec<_>>(),
         thinned => (samples > most).then_some(most),
-        held_out => held_out.map(|from| if from > time[0] { format!("from {from:.1} s") } else { "all of it".to_owned() }),
+        held_out => held_out.map(|from| format!("from {from:.1} s")),
     }
 }
 
@@ -133,7 +133,7 @@ fn exposed_context(exposed: Exposed, residuals: &Residuals) -> Value {
 
 /// What an effect is, in one line.
 fn meaning(effect: &str) -> &'static str {
-    Effects::DESCRIPTIONS.iter().find(|known| known.name == effect).map_or("", |known| known.meaning)
+    Effects::description(effect).map_or("", |known| known.meaning)
 }
 
 fn errors_context(errors: &SignalErrors) -> Value {
@@ -267,7 +267,7 @@ mod tests {
             causes,
             signals: vec![SignalErrors { signal: Signal::Force, nominal_rms: 20.0, extended_rms: 2.0, noise_rms: 1.0 }],
             improvement: 0.9,
-            held_out: vec![HeldOut { recording: "<i>.csv".to_owned(), from: 6.0, is_whole: false }],
+            held_out: vec![HeldOut { recording: "<i>.csv".to_owned(), from: 6.0 }],
             saw_all: false,
             ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2, parameters: Vec::new() }],
             extended: Parameters::default(),

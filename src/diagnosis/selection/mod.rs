@@ -5,6 +5,7 @@ mod forms;
 mod makeshift;
 mod naming;
 
+use super::Fitting;
 use super::Verdict;
 use super::fits::{Bench, Fitted, Slopes, Start};
 use super::hypothesis::{Part, has_many_minima, neutralised};
@@ -104,6 +105,7 @@ impl Chosen {
 pub struct Search<'a> {
     /// The hypotheses' fits.
     pub bench: Bench<'a>,
+    fitting: &'a Fitting<'a>,
     baseline: Fitted,
     /// Whether what the form of one cause may leave is worth a second one.
     minds_form: bool,
@@ -116,12 +118,13 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search from a baseline, with single effects fitted; `done` is told after each candidate. Where another search lets the coefficients be
+    /// A search from a baseline, with single effects fitted; `fitting` is told the effects of each fit. Where another search lets the coefficients be
     /// off in a way that allows more, what the form of a cause may leave is that one's to explain: else coefficients that are off come out as
     /// a second cause.
-    pub fn new(bench: Bench<'a>, baseline: Fitted, minds_form: bool, done: &(dyn Fn(&str) + Sync)) -> Self {
-        let mut search = Self { bench, baseline, minds_form, levels: Vec::new(), from: Vec::new(), unlisted: None };
-        let starts = search.starts(done);
+    pub fn new(bench: Bench<'a>, baseline: Fitted, minds_form: bool, fitting: &'a Fitting<'a>) -> Self {
+        let mut search =
+            Self { bench, fitting, baseline, minds_form, levels: Vec::new(), from: Vec::new(), unlisted: None };
+        let starts = search.starts();
         search.from = best_of_each(&starts);
         let mut singles = search.fitted(&search.baseline, starts, FITTED.0);
         if singles.first().is_some_and(|best| best.evidence > LEAST_EVIDENCE) {
@@ -172,12 +175,8 @@ impl<'a> Search<'a> {
     }
 
     /// Where fits of single effects start, the most promising of each first.
-    fn starts(&self, done: &(dyn Fn(&str) + Sync)) -> Vec<Vec<Start>> {
-        let starts = Effects::DESCRIPTIONS.par_iter().map(|effect| {
-            let starts = self.bench.starts(&self.baseline, effect);
-            done(effect.name);
-            starts
-        });
+    fn starts(&self) -> Vec<Vec<Start>> {
+        let starts = Effects::DESCRIPTIONS.par_iter().map(|effect| self.bench.starts(&self.baseline, effect));
         starts.filter(|starts| !starts.is_empty()).collect()
     }
 
@@ -215,6 +214,7 @@ impl<'a> Search<'a> {
     /// looks as if it might be worth it.
     fn fitted_from(&self, base: &Judged, start: &Start, slopes: &Slopes) -> Option<Judged> {
         let hypothesis = base.fitted.hypothesis.with(start.part);
+        (self.fitting)(&hypothesis.names().join(" + "));
         let first = self.judge(self.bench.rough_fit_with(slopes, &hypothesis, &self.bench.settled(start))?);
         if base.fitted.hypothesis.parts.is_empty() || self.further(base, &first) < MAY_COME_FURTHER {
             return Some(first);

@@ -1,0 +1,84 @@
+//! Scales of sensors and of forces, which need be neither straight nor at once what they become.
+
+use std::fmt::Write;
+
+/// By how much a scale is off, over its values and over time.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Scale {
+    /// Value at which the error is stated, the middle of the usual range.
+    pub middle: f64,
+    /// Relative error there.
+    pub relative_error: f64,
+    /// Change of the error from the middle to twice that, in proportion to the value.
+    pub bend: f64,
+    /// A third of the change of the error from the middle to twice that, with the square of the value.
+    pub curvature: f64,
+    /// Excess of the error at the start, and time constant in s of its settling.
+    pub settling: (f64, f64),
+}
+
+impl Scale {
+    /// y (1 + g + b (r − 1) + c (r² − 1) + s exp(−t/τ)) with r = y/middle, t the time in s since the start.
+    #[inline]
+    pub fn shown(&self, value: f64, time: f64) -> f64 {
+        let ratio = value / self.middle;
+        let of_value = self.bend * (ratio - 1.0) + self.curvature * (ratio.powi(2) - 1.0);
+        value * (1.0 + self.relative_error + of_value + settled(self.settling, time))
+    }
+
+    /// The value behind a reading at a time in s since the start: the root of a quadratic that is near to the reading. A curvature is not
+    /// undone.
+    pub fn behind(&self, reading: f64, time: f64) -> f64 {
+        let slope = 1.0 + self.relative_error + settled(self.settling, time) - self.bend;
+        2.0 * reading / (slope + (slope * slope + 4.0 * self.bend / self.middle * reading).max(0.0).sqrt())
+    }
+
+    /// Whether it is always right.
+    pub fn is_neutral(&self) -> bool {
+        [self.relative_error, self.bend, self.curvature, self.settling.0] == [0.0; 4]
+    }
+
+    /// What a sensor shows at the middle of its range, which is given in words, and what differs from that elsewhere and at the start.
+    pub fn told(&self, middle: &str) -> String {
+        let word = if self.relative_error < 0.0 { "less" } else { "more" };
+        let mut told = format!("{:.1} % {word} than there is", 100.0 * self.relative_error.abs());
+        let at_twice = self.bend + 3.0 * self.curvature;
+        if at_twice != 0.0 {
+            let _ = write!(told, " at {middle}, and {:+.1} % on top at twice that", 100.0 * at_twice);
+        }
+        let (excess, constant) = self.settling;
+        if excess != 0.0 {
+            let _ = write!(told, ", {:+.1} % on top at the start, which settle within {constant:.1} s", 100.0 * excess);
+        }
+        told
+    }
+}
+
+/// What is left at a time in s of an excess at the start that settles with a time constant in s; before the start all of it.
+#[inline]
+pub fn settled((excess, constant): (f64, f64), time: f64) -> f64 {
+    if excess == 0.0 { 0.0 } else { excess * (-time.max(0.0) / constant).exp() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curved_scale_is_a_cubic_through_its_error_at_the_middle() {
+        let scale = Scale { middle: 400.0, relative_error: -0.06, bend: 0.01, curvature: -0.02, ..Scale::default() };
+        // F = r 400 N reads 400 (r (1 − 0.06 − 0.01 + 0.02) + 0.01 r² − 0.02 r³).
+        for (ratio, reading) in [(0.0, 0.0), (0.5, 190.0), (1.0, 376.0), (2.0, 712.0)] {
+            assert!((scale.shown(400.0 * ratio, 0.0) - reading).abs() < 1e-9, "{ratio}");
+        }
+        assert_eq!(scale.told("400 N"), "6.0 % less than there is at 400 N, and -5.0 % on top at twice that");
+    }
+
+    #[test]
+    fn what_is_behind_a_reading_shows_it() {
+        let scale = Scale { middle: 0.1, relative_error: 0.04, bend: -0.03, settling: (0.05, 2.0), curvature: 0.0 };
+        for (value, time) in [(0.0, 0.0), (0.07, 0.5), (0.21, 30.0)] {
+            assert!((scale.behind(scale.shown(value, time), time) - value).abs() < 1e-15);
+        }
+    }
+}
