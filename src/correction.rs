@@ -84,7 +84,7 @@ crate::variables::variables! {
     ///
     /// # Model
     /// Σ c_ij T_i(a) T_j(b) with Chebyshev polynomials T and the two variables scaled from their ranges to −1..1;
-    /// outside the ranges the value at the edge holds.
+    /// outside the ranges the value at the edge holds. A force knows of no command: there the gauge pressure counts for the commanded one.
     ///
     /// # Validity
     /// Where the recordings were that it was fitted to, and nowhere else.
@@ -153,13 +153,17 @@ impl UnknownCause {
     /// The force in N with the correction.
     #[inline]
     pub(crate) fn force(&self, at: &Point, force: f64) -> f64 {
-        if self.acts_on == ActsOn::Force { force + FORCE_UNIT * self.value(at) } else { force }
+        if self.acts_on != ActsOn::Force {
+            return force;
+        }
+        // What the muscle pulls with goes with what is in it, whatever the command asks for.
+        force + FORCE_UNIT * self.value(&Point { commanded_pressure: at.gauge_pressure, ..*at })
     }
 
-    /// The target pressure in Pa with the correction, never below ambient.
+    /// The target pressure in Pa with the correction.
     #[inline]
     pub(crate) fn target_pressure(&self, at: &Point, target: f64) -> f64 {
-        if self.acts_on == ActsOn::TargetPressure { (target + PRESSURE_UNIT * self.value(at)).max(0.0) } else { target }
+        if self.acts_on == ActsOn::TargetPressure { target + PRESSURE_UNIT * self.value(at) } else { target }
     }
 
     fn value(&self, at: &Point) -> f64 {

@@ -420,17 +420,19 @@ fn fits() -> ProgressBar {
 }
 
 fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
-    let mut files = vec![(out.join("simulated.csv"), report::simulated_csv(&[("simulated", parameters)], recordings)?)];
+    let replayed = |recording| Ok([replay(parameters, recording)?]);
+    let replays = recordings.iter().map(replayed).collect::<Result<Vec<_>>>()?;
+    let mut files = vec![(out.join("simulated.csv"), report::simulated_csv(["simulated"], recordings, &replays))];
     let (mut rows, mut errors) = (Vec::new(), Vec::new());
-    for recording in recordings {
+    for (recording, replays) in recordings.iter().zip(&replays) {
         let name = recording.name();
         let stem = name.trim_end_matches(".csv").replace(['/', '\\'], "_");
-        for (k, svg) in report::recording_plots(parameters, parameters, recording)?.into_iter().enumerate() {
+        let plots = report::time_plots(recording, replays).into_iter();
+        for (k, svg) in plots.chain(report::residual_plot(parameters, parameters, recording)?).enumerate() {
             files.push((out.join(format!("{stem}-{}.svg", k + 1)), svg.into_bytes()));
         }
-        let replay = replay(parameters, recording)?;
         for signal in OUTPUTS {
-            if let (Some(measured), Some(simulated)) = (recording.get(signal), replay.get(signal)) {
+            if let (Some(measured), Some(simulated)) = (recording.get(signal), replays[0].get(signal)) {
                 let Some(rms) = rms_difference(measured, simulated) else { continue };
                 let (signal, unit) = (signal.name(), signal.unit());
                 errors.push(json!({ "recording": name, "signal": signal, "rms": rms, "unit": unit }));

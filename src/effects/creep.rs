@@ -154,8 +154,9 @@ impl Effect for Creep {
 
     // The second element may be a small part of the whole, and fast.
     fn is_plausible(&self) -> bool {
-        let never_relaxes = self.relaxing_stiffness_1 != 0.0 && self.time_1 > (1.0 - NEARLY) * SLOWEST;
-        self.time_1 > SLOW && !never_relaxes
+        let relaxing = [(self.relaxing_stiffness_1, self.time_1), (self.relaxing_stiffness_2, self.time_2)];
+        let never_relaxes = |(stiffness, time): &(f64, f64)| *stiffness != 0.0 && *time > (1.0 - NEARLY) * SLOWEST;
+        self.time_1 > SLOW && !relaxing.iter().any(never_relaxes)
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {

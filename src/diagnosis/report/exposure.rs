@@ -7,6 +7,7 @@ use crate::diagnosis::links::{Chain, Exposure, Link, Variable, mean_square, most
 use crate::measurement::Recording;
 use crate::parameters::Parameters;
 use crate::variables::Declared;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::ops::Range;
 
@@ -58,7 +59,7 @@ impl Residuals {
         let mut links = Vec::new();
         let mut residuals = vec![Vec::new(); models.len()];
         let chains: Vec<Vec<Chain>> =
-            models.iter().map(|model| recordings.iter().map(|r| Chain::new(model, r)).collect()).collect();
+            models.par_iter().map(|model| recordings.par_iter().map(|r| Chain::new(model, r)).collect()).collect();
         for link in Link::ALL {
             let of_model =
                 |chains: &Vec<Chain>| pooled(recordings.iter().zip(chains).map(|(r, chain)| (r, chain.residual(link))));

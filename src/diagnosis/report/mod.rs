@@ -8,7 +8,7 @@ mod pictures;
 mod simulated;
 
 pub use json::to_json;
-pub use pictures::{recording_plots, residual_plot};
+pub use pictures::{residual_plot, time_plots};
 pub use simulated::simulated_csv;
 
 use super::{Correction, Diagnosis, Verdict};
@@ -18,6 +18,8 @@ use crate::measurement::{Recording, Signal};
 use crate::models::models;
 use crate::package::{Library, fmu};
 use crate::parameters::Parameters;
+use crate::simulation::replay;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Unit for people and its size in SI.
@@ -107,6 +109,8 @@ pub fn files(
     folder: &Path,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
     let extended = &diagnosis.extended;
+    let both = |recording: &Recording| Ok([replay(nominal, recording)?, replay(extended, recording)?]);
+    let replays = recordings.par_iter().map(both).collect::<Result<Vec<_>>>()?;
     let made = |name: &str, purpose, bytes| Made { name: name.to_owned(), purpose, bytes };
     let mut files = vec![
         made(
@@ -118,7 +122,7 @@ pub fn files(
         made(
             "simulated.csv",
             "measured, nominal and extended signals, SI units",
-            simulated_csv(&[("nominal", nominal), ("extended", extended)], recordings)?,
+            simulated_csv(["nominal", "extended"], recordings, &replays),
         ),
         made("diagnosis.json", "this diagnosis for machines", format!("{:#}\n", to_json(diagnosis)).into()),
     ];
@@ -133,7 +137,7 @@ pub fn files(
         files.push(made("unknown_cause.toml", "the model with a correction of unknown cause", model.to_toml().into()));
         files.push(made(&name, "the FMU with a correction of unknown cause", fmu(interface, model, libraries)));
     }
-    let page = page::html(diagnosis, nominal, recordings, &files)?;
+    let page = page::html(diagnosis, nominal, recordings, &replays, &files);
     files.push(made("report.html", "this page", page.into()));
     Ok(files.into_iter().map(|file| (folder.join(file.name), file.bytes)).collect())
 }

@@ -3,39 +3,41 @@
 use super::curves::{compared, most_samples, over_time};
 use super::exposure::{Exposed, Residuals, SEEN};
 use super::{Made, display_unit, gain, headline, pictures, which_samples};
-use crate::Result;
 use crate::diagnosis::links::Variable;
 use crate::diagnosis::{Cause, Diagnosis, FittedParameter, Ranked, SignalErrors, Verdict};
 use crate::effects::Effects;
 use crate::measurement::{Recording, Signal};
 use crate::package::{render, short};
 use crate::parameters::Parameters;
-use crate::simulation::{OUTPUTS, replay};
+use crate::simulation::{OUTPUTS, Replay};
 use minijinja::{Value, context};
 use serde_json::json;
 use std::f64::consts::TAU;
 
-/// The page; `files` are those that lie beside it.
-///
-/// # Errors
-/// Errors of the simulation of the nominal or the extended model.
-pub fn html(diagnosis: &Diagnosis, nominal: &Parameters, recordings: &[Recording], files: &[Made]) -> Result<String> {
+/// The page; `replays` are those of each recording by the nominal and by the extended model, `files` those that lie beside it.
+pub fn html(
+    diagnosis: &Diagnosis,
+    nominal: &Parameters,
+    recordings: &[Recording],
+    replays: &[[Replay; 2]],
+    files: &[Made],
+) -> String {
     let residuals = Residuals::new(diagnosis, nominal, recordings);
     let exposed = residuals.exposed(diagnosis);
     let most = most_samples(recordings.len());
     let (mut curves, mut of_recordings, mut static_plots) = (Vec::new(), Vec::new(), Vec::new());
-    for (index, recording) in recordings.iter().enumerate() {
-        let replays = [replay(nominal, recording)?, replay(&diagnosis.extended, recording)?];
+    for (index, (recording, replays)) in recordings.iter().zip(replays).enumerate() {
         let signals = compared(recording, &replays[0]);
         let own = diagnosis.held_out.iter().find(|part| part.recording == recording.name());
         let held_out = own.map(|part| part.from).filter(|_| !diagnosis.saw_all);
         curves.push(json!({
             "held_out_from": held_out,
-            "signals": signals.iter().map(|s| over_time(diagnosis, recording, *s, &replays, most)).collect::<Vec<_>>(),
+            "signals": signals.iter().map(|s| over_time(diagnosis, recording, *s, replays, most)).collect::<Vec<_>>(),
             "dots": residuals.dots(index, &exposed),
         }));
         of_recordings.push(recording_context(recording, &signals, held_out, most));
-        static_plots.extend(pictures::time_plots(nominal, &diagnosis.extended, recording)?);
+        let is_extended = diagnosis.extended != *nominal;
+        static_plots.extend(pictures::time_plots(recording, if is_extended { replays } else { &replays[..1] }));
     }
     let data = json!({ "axes": residuals.axes(diagnosis), "recordings": curves });
     let causes = diagnosis.causes.iter().zip(&exposed);
@@ -71,7 +73,7 @@ pub fn html(diagnosis: &Diagnosis, nominal: &Parameters, recordings: &[Recording
         data => inside_script(&data),
         version => env!("CARGO_PKG_VERSION"),
     };
-    Ok(render("report.html", include_str!("page.html"), &page))
+    render("report.html", include_str!("page.html"), &page)
 }
 
 /// JSON that nothing inside can end the `<script>` around, and that is JavaScript as well.
@@ -248,6 +250,7 @@ fn next_measurements(diagnosis: &Diagnosis, recordings: &[Recording]) -> Vec<Str
 mod tests {
     use super::*;
     use crate::diagnosis::{HeldOut, Remaining};
+    use crate::simulation::replay;
 
     #[test]
     fn nothing_in_the_data_ends_the_script() {
@@ -288,7 +291,8 @@ mod tests {
             (0..100).map(|k| format!("{},2e5,{},{}\n", 0.1 * k as f64, 80.0 + 20.0 * wave(k), 900.0 + 200.0 * wave(k)));
         let text = format!("time [s],gauge_pressure [Pa],contraction [mm],force [N]\n{}", rows.collect::<String>());
         let recording = Recording::parse(text.as_bytes(), std::path::Path::new("<i>.csv"), &[]).unwrap();
-        html(diagnosis, &Parameters::default(), &[recording], &[]).unwrap()
+        let replays = [[&Parameters::default(), &diagnosis.extended].map(|model| replay(model, &recording).unwrap())];
+        html(diagnosis, &Parameters::default(), &[recording], &replays, &[])
     }
 
     #[test]

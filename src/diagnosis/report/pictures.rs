@@ -5,44 +5,26 @@ use crate::Result;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::plot::{Curve, plot};
-use crate::simulation::{OUTPUTS, replay, replay_muscle};
+use crate::simulation::{OUTPUTS, Replay, replay, replay_muscle};
 
-/// Measured against simulated over time, and the residual over the contraction, as SVG.
-///
-/// # Errors
-/// Errors of the simulation.
-pub fn recording_plots(nominal: &Parameters, extended: &Parameters, recording: &Recording) -> Result<Vec<String>> {
-    let mut plots = time_plots(nominal, extended, recording)?;
-    plots.extend(residual_plot(nominal, extended, recording)?);
-    Ok(plots)
-}
-
-/// Measured against simulated over time for every signal, as SVG.
-///
-/// # Errors
-/// Errors of the simulation.
-pub fn time_plots(nominal: &Parameters, extended: &Parameters, recording: &Recording) -> Result<Vec<String>> {
-    let (before, after) = (replay(nominal, recording)?, replay(extended, recording)?);
+/// Measured against simulated over time for every signal, as SVG; the simulations are those of the nominal model and, where there is one, of
+/// the extended model.
+pub fn time_plots(recording: &Recording, replays: &[Replay]) -> Vec<String> {
     let name = recording.name();
     let mut plots = Vec::new();
     for signal in OUTPUTS {
-        let (Some(measured), Some(before), Some(after)) =
-            (recording.get(signal), before.get(signal), after.get(signal))
-        else {
-            continue;
-        };
+        let simulated: Option<Vec<&[f64]>> = replays.iter().map(|replay| replay.get(signal)).collect();
+        let (Some(measured), Some(simulated)) = (recording.get(signal), simulated) else { continue };
         let (unit, size) = display_unit(signal);
-        let shown = |values: &[f64]| values.iter().map(|value| value / size).collect::<Vec<_>>();
-        let (measured, before, after) = (shown(measured), shown(before), shown(after));
-        let curve = |label, y, color| Curve { label, x: &recording.time, y, color };
-        let mut curves = vec![curve("measured", measured.as_slice(), 0), curve("nominal", before.as_slice(), 1)];
-        if nominal != extended {
-            curves.push(curve("extended", after.as_slice(), 2));
-        }
+        let shown: Vec<Vec<f64>> =
+            [measured].into_iter().chain(simulated).map(|all| all.iter().map(|value| value / size).collect()).collect();
+        let labels = ["measured", "nominal", "extended"].into_iter().zip(&shown).enumerate();
+        let curves: Vec<Curve> =
+            labels.map(|(color, (label, y))| Curve { label, x: &recording.time, y, color }).collect();
         let label = format!("{} [{unit}]", signal.name().replace('_', " "));
         plots.push(plot(&format!("{name}: {}", signal.name().replace('_', " ")), "time [s]", &label, &curves));
     }
-    Ok(plots)
+    plots
 }
 
 /// The residual over the contraction: of the force, with the chain cut at the measured pressure and contraction, where

@@ -1,26 +1,21 @@
 //! `simulated.csv`.
 
-use crate::Result;
 use crate::measurement::Recording;
-use crate::parameters::Parameters;
-use crate::simulation::{OUTPUTS, replay};
+use crate::simulation::{OUTPUTS, Replay};
 use std::fmt::Write;
 
-/// Measured and simulated signals of all recordings as CSV, in SI units.
-///
-/// # Errors
-/// Errors of the simulation.
-pub fn simulated_csv(models: &[(&str, &Parameters)], recordings: &[Recording]) -> Result<Vec<u8>> {
+/// Measured and simulated signals of all recordings as CSV, in SI units; `replays` are those of each recording, one by each of the models with
+/// these labels.
+pub fn simulated_csv<const N: usize>(labels: [&str; N], recordings: &[Recording], replays: &[[Replay; N]]) -> Vec<u8> {
     let mut text = String::from("recording,time [s]");
     for signal in OUTPUTS {
         let _ = write!(text, ",measured_{} [{}]", signal.name(), signal.unit());
-        models.iter().for_each(|(label, _)| {
+        labels.iter().for_each(|label| {
             let _ = write!(text, ",{label}_{} [{}]", signal.name(), signal.unit());
         });
     }
     text.push('\n');
-    for recording in recordings {
-        let replays = models.iter().map(|(_, p)| replay(p, recording)).collect::<Result<Vec<_>>>()?;
+    for (recording, replays) in recordings.iter().zip(replays) {
         let name = quoted(&recording.name());
         for (k, time) in recording.time.iter().enumerate() {
             let _ = write!(text, "{name},{time}");
@@ -34,7 +29,7 @@ pub fn simulated_csv(models: &[(&str, &Parameters)], recordings: &[Recording]) -
             text.push('\n');
         }
     }
-    Ok(text.into_bytes())
+    text.into_bytes()
 }
 
 /// A CSV cell that may hold separators.
