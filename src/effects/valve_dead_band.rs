@@ -10,7 +10,7 @@ crate::variables::variables! {
     /// wider by b u, as friction that the pressure presses on. Stiction: it rests until
     /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`; it sticks again at once or, where u is faster than
     /// `sliding_speed`, once u turns. Behind a play of (S − J)/2, a stiction of J then makes the band S and the slip jump J of
-    /// Choudhury. Overlap: the spool opens no port while the
+    /// Choudhury, and without sliding a play of f_d and a stiction of f_s − f_d the pilot of He, which moves from f_s on and falls short by f_d. Overlap: the spool opens no port while the
     /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
     /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
     /// opens the more abruptly. Rounded edges let |e| − h set in gradually, about a share of h around it: `overlap_rounding`. The port for
@@ -28,7 +28,9 @@ crate::variables::variables! {
     /// asleep some 6 ms late, about a cycle of a digital regulator.
     ///
     /// # Reference
-    /// M. Choudhury, N. Thornhill, S. Shah (2005), Modelling valve stiction, doi 10.1016/j.conengprac.2004.05.005.
+    /// M. Choudhury, N. Thornhill, S. Shah (2005), Modelling valve stiction, doi 10.1016/j.conengprac.2004.05.005;
+    /// Q. He, J. Wang, M. Pottmann, S. Qin (2007), A curve fitting method for detecting valve stiction in oscillating control loops, Industrial &
+    /// Engineering Chemistry Research 46, 4549.
     pub struct ValveDeadBand in "valve_dead_band." as Tunable {
         /// Half width of the play of the pilot
         play: f64 = 0.0, VOLT, (0.0..=2.0);
@@ -69,6 +71,24 @@ const STICTION_STARTS: &[f64] = &[
     0.129, 0.139, 0.150, 0.161, 0.173, 0.187, 0.201, 0.216, 0.232, 0.250,
     0.269, 0.290, 0.312, 0.336, 0.362, 0.390, 0.420, 0.452, 0.487,
 ];
+
+/// The same of play and stiction together, of which each may have three shares.
+#[rustfmt::skip]
+const SHORT_STARTS: [f64; 26] = [
+    0.030, 0.033, 0.037, 0.040, 0.044, 0.049, 0.054, 0.059, 0.065, 0.072, 0.079, 0.087, 0.096,
+    0.105, 0.116, 0.127, 0.140, 0.154, 0.169, 0.186, 0.205, 0.226, 0.248, 0.273, 0.300, 0.330,
+];
+
+/// Each of three shares of each value.
+const fn parts_of(values: [f64; 26], shares: [f64; 3]) -> [f64; 78] {
+    let mut all = [0.0; 78];
+    let mut k = 0;
+    while k < all.len() {
+        all[k] = values[k / 3] * shares[k % 3];
+        k += 1;
+    }
+    all
+}
 
 /// Time constant in s with which it is found that a valve must regulate, or need not, and with which it begins, or ends.
 const WAKES_WITHIN: f64 = 4e-3;
@@ -134,11 +154,18 @@ impl Effect for ValveDeadBand {
             ],
             &[("valve_dead_band.waking", WAKING_STARTS), ("valve_dead_band.resting_share", &[0.15])],
         ],
-        further_forms: &[&[
-            ("valve_dead_band.stiction", &[0.03, 0.08, 0.15, 0.03, 0.08, 0.15, 0.03, 0.08, 0.15]),
-            ("valve_dead_band.play", &[0.01, 0.01, 0.01, 0.03, 0.03, 0.03, 0.08, 0.08, 0.08]),
-            ("valve_dead_band.sliding_speed", &[1e-3]),
-        ]],
+        further_forms: &[
+            &[
+                ("valve_dead_band.stiction", &[0.03, 0.08, 0.15, 0.03, 0.08, 0.15, 0.03, 0.08, 0.15]),
+                ("valve_dead_band.play", &[0.01, 0.01, 0.01, 0.03, 0.03, 0.03, 0.08, 0.08, 0.08]),
+                ("valve_dead_band.sliding_speed", &[1e-3]),
+            ],
+            // A pilot that jumps to where it falls short of its command.
+            &[
+                ("valve_dead_band.stiction", &parts_of(SHORT_STARTS, [0.75, 0.5, 0.25])),
+                ("valve_dead_band.play", &parts_of(SHORT_STARTS, [0.25, 0.5, 0.75])),
+            ],
+        ],
         refinements: &[
             ("valve_dead_band.start", &[0.3]),
             ("valve_dead_band.play_growth", &[0.01]),
