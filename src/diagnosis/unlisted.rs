@@ -16,6 +16,11 @@ const FINE_STEPS: i32 = 8;
 const DAMPING: f64 = 0.05;
 const DAMPINGS: [f64; 4] = [0.01, 0.025, 0.05, 0.1];
 
+/// Times in s within which the charge of a cell may leak, the first and the last, and the step between them, as a ratio.
+const FADING: (f64, f64, f64) = (1.0, 150.0, 1.25);
+/// Gauge pressures in Pa, the last one and their spacing, at one of which a hose leaves a sensor alone; and the finer spacing around the best.
+const AT_EASE: (f64, f64, f64) = (4e5, 5e4, 5e3);
+
 /// A cause in no library.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unlisted {
@@ -25,6 +30,10 @@ pub enum Unlisted {
     CrossTalk(Signal),
     /// The post of the position sensor rocks when the load is accelerated: frequency in Hz, damping ratio.
     Rocking { frequency: f64, damping: f64 },
+    /// The charge of a piezoelectric force cell leaks: a share of what the force was is lost within a time in s.
+    Fading { time: f64 },
+    /// A hose stiffens under pressure and pushes a sensor aside: in proportion to the gauge pressure in Pa above one at which it does not.
+    Hose { signal: Signal, at_ease: f64 },
 }
 
 impl Unlisted {
@@ -36,22 +45,29 @@ impl Unlisted {
             speeds.map(move |speed| Self::Slip { direction, speed })
         });
         let talks = [Signal::Force, Signal::Contraction].map(Self::CrossTalk);
-        let (lowest, highest, ratio) = ROCKING;
-        let frequencies =
-            std::iter::successors(Some(lowest), move |f| Some(f * ratio)).take_while(move |f| *f <= highest);
-        let rocking = frequencies.map(|frequency| Self::Rocking { frequency, damping: DAMPING });
-        slips.chain(talks).chain(rocking).collect()
+        let rocking = steps(ROCKING).map(|frequency| Self::Rocking { frequency, damping: DAMPING });
+        let fading = steps(FADING).map(|time| Self::Fading { time });
+        let (last, spacing, _) = AT_EASE;
+        let hoses = [Signal::Force, Signal::Contraction].into_iter().flat_map(|signal| {
+            let pressures = (0..).map(move |k| f64::from(k) * spacing).take_while(move |pressure| *pressure <= last);
+            pressures.map(move |at_ease| Self::Hose { signal, at_ease })
+        });
+        slips.chain(talks).chain(rocking).chain(fading).chain(hoses).collect()
     }
 
     /// Forms between those of [`Self::all`].
     pub fn nearby(self) -> Vec<Self> {
         match self {
             Self::Rocking { frequency, .. } => {
-                let fine = ROCKING.2.powf(1.0 / f64::from(FINE_STEPS));
-                let all = (-FINE_STEPS..=FINE_STEPS).flat_map(|k| {
-                    DAMPINGS.map(|damping| Self::Rocking { frequency: frequency * fine.powi(k), damping })
-                });
+                let all = around(frequency, ROCKING.2)
+                    .flat_map(|frequency| DAMPINGS.map(|damping| Self::Rocking { frequency, damping }));
                 all.collect()
+            }
+            Self::Fading { time } => around(time, FADING.2).map(|time| Self::Fading { time }).collect(),
+            Self::Hose { signal, at_ease } => {
+                let (_, spacing, fine) = AT_EASE;
+                let steps = (spacing / fine) as i32;
+                (-steps..=steps).map(|k| Self::Hose { signal, at_ease: at_ease + f64::from(k) * fine }).collect()
             }
             _ => vec![self],
         }
@@ -61,24 +77,32 @@ impl Unlisted {
     pub fn is_like(self, other: Self) -> bool {
         match (self, other) {
             (Self::CrossTalk(own), Self::CrossTalk(others)) => own == others,
+            (Self::Hose { signal: own, .. }, Self::Hose { signal: others, .. }) => own == others,
             _ => std::mem::discriminant(&self) == std::mem::discriminant(&other),
         }
     }
 
     /// The reading that it spoils.
     pub fn signal(self) -> Signal {
-        if let Self::CrossTalk(signal) = self { signal } else { Signal::Contraction }
+        match self {
+            Self::CrossTalk(signal) | Self::Hose { signal, .. } => signal,
+            Self::Fading { .. } => Signal::Force,
+            Self::Slip { .. } | Self::Rocking { .. } => Signal::Contraction,
+        }
     }
 
-    /// Smallest and largest size: no wheel gains way, or loses more than all.
+    /// Smallest and largest size: no wheel gains way nor a cell charge, or loses more than all.
     pub fn sizes(self) -> (f64, f64) {
-        if matches!(self, Self::Slip { .. }) { (0.0, 1.0) } else { (f64::NEG_INFINITY, f64::INFINITY) }
+        match self {
+            Self::Slip { .. } | Self::Fading { .. } => (0.0, 1.0),
+            Self::CrossTalk(_) | Self::Rocking { .. } | Self::Hose { .. } => (f64::NEG_INFINITY, f64::INFINITY),
+        }
     }
 
     /// How many parameters it has, its size among them.
     pub fn parameters(self) -> usize {
         match self {
-            Self::Slip { .. } => 2,
+            Self::Slip { .. } | Self::Fading { .. } | Self::Hose { .. } => 2,
             Self::CrossTalk(_) => 1,
             Self::Rocking { .. } => 3,
         }
@@ -92,6 +116,8 @@ impl Unlisted {
             Self::Slip { .. } => "the way moved fast, as if a measuring wheel slipped",
             Self::CrossTalk(_) => "the command, as if its line talked into the sensor's",
             Self::Rocking { .. } => "the acceleration, as if the post of the sensor rocked",
+            Self::Fading { .. } => "what the force was before, as if the charge of a piezoelectric cell leaked",
+            Self::Hose { .. } => "the pressure, as if a hose pushed the sensor",
         }
     }
 
@@ -106,6 +132,15 @@ impl Unlisted {
             }
             Self::Rocking { frequency, damping } => {
                 Some(rocking(time, simulated.get(Signal::Contraction)?, frequency, damping))
+            }
+            Self::Fading { time: constant } => {
+                let remembered = lagging(time, simulated.get(Signal::Force)?, constant);
+                Some(remembered.into_iter().map(|force| -force).collect())
+            }
+            Self::Hose { at_ease, .. } => {
+                let measured = || recording.bridged(Signal::GaugePressure);
+                let pressures = simulated.get(Signal::GaugePressure).map(<[f64]>::to_vec).or_else(measured)?;
+                Some(pressures.into_iter().map(|pressure| pressure - at_ease).collect())
             }
         }
     }
@@ -130,6 +165,28 @@ impl<'d> Shown<'d> {
             recordings.map(|(recording, replay)| cause.course(recording, replay)).collect();
         self.data.at_residuals(cause.signal(), &courses)
     }
+}
+
+/// Values from a first one to a last one, by a ratio.
+fn steps((first, last, ratio): (f64, f64, f64)) -> impl Iterator<Item = f64> {
+    std::iter::successors(Some(first), move |value| Some(value * ratio)).take_while(move |value| *value <= last)
+}
+
+/// Values around one of such steps, up to the next ones.
+fn around(value: f64, ratio: f64) -> impl Iterator<Item = f64> {
+    let fine = ratio.powf(1.0 / f64::from(FINE_STEPS));
+    (-FINE_STEPS..=FINE_STEPS).map(move |k| value * fine.powi(k))
+}
+
+/// What a lag of first order, τ dl/dt + l = y with τ in s, makes of lines between the samples from l = 0 on; exact.
+fn lagging(time: &[f64], y: &[f64], constant: f64) -> Vec<f64> {
+    let mut lag = 0.0;
+    let lags = time.windows(2).zip(y.windows(2)).map(|(time, y)| {
+        let behind = constant * (y[1] - y[0]) / (time[1] - time[0]);
+        lag = y[1] - behind + (lag - y[0] + behind) * (-(time[1] - time[0]) / constant).exp();
+        lag
+    });
+    std::iter::once(0.0).chain(lags).collect()
 }
 
 /// What a reading is off by that misses all of the way which is moved in a direction faster than a speed; integrated by trapezia.
@@ -191,6 +248,17 @@ mod tests {
         for (t, y) in time.iter().zip(rocking(&time, &time, frequency, damping)) {
             let expected = (-damping * rate * t).exp() * (swing * t).sin() / swing;
             assert!((y - expected).abs() < 1e-12, "{t} s: {y} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_lag_of_a_ramp_is_as_the_textbook_says() {
+        // l = t − τ (1 − e^(−t/τ)) under y = t; under a constant y its part 1 − e^(−t/τ).
+        let time: Vec<f64> = (0..200).map(|k| 5e-2 * f64::from(k) + 1e-2 * f64::from(k % 3)).collect();
+        let y: Vec<f64> = time.iter().map(|t| 3.0 + t).collect();
+        for (t, lag) in time.iter().zip(lagging(&time, &y, 2.0)) {
+            let of_step = 1.0 - (-t / 2.0).exp();
+            assert!((lag - (t - 2.0 * of_step + 3.0 * of_step)).abs() < 1e-12, "{t} s");
         }
     }
 

@@ -72,19 +72,16 @@ const STICTION_STARTS: &[f64] = &[
     0.269, 0.290, 0.312, 0.336, 0.362, 0.390, 0.420, 0.452, 0.487,
 ];
 
-/// The same of play and stiction together, of which each may have three shares.
-#[rustfmt::skip]
-const SHORT_STARTS: [f64; 26] = [
-    0.030, 0.033, 0.037, 0.040, 0.044, 0.049, 0.054, 0.059, 0.065, 0.072, 0.079, 0.087, 0.096,
-    0.105, 0.116, 0.127, 0.140, 0.154, 0.169, 0.186, 0.205, 0.226, 0.248, 0.273, 0.300, 0.330,
-];
+/// Play and stiction of a pilot that falls short where it jumps to, together, each time half and half or in a ratio of 1 to 3.
+const SHORT_STARTS: &[f64] =
+    &[0.03, 0.036, 0.043, 0.052, 0.062, 0.075, 0.09, 0.107, 0.13, 0.154, 0.185, 0.222, 0.267, 0.32];
 
-/// Each of three shares of each value.
-const fn parts_of(values: [f64; 26], shares: [f64; 3]) -> [f64; 78] {
-    let mut all = [0.0; 78];
+/// Each of two shares of each of those.
+const fn shares(shares: [f64; 2]) -> [f64; 2 * SHORT_STARTS.len()] {
+    let mut all = [0.0; 2 * SHORT_STARTS.len()];
     let mut k = 0;
     while k < all.len() {
-        all[k] = values[k / 3] * shares[k % 3];
+        all[k] = SHORT_STARTS[k / 2] * shares[k % 2];
         k += 1;
     }
     all
@@ -161,10 +158,7 @@ impl Effect for ValveDeadBand {
                 ("valve_dead_band.sliding_speed", &[1e-3]),
             ],
             // A pilot that jumps to where it falls short of its command.
-            &[
-                ("valve_dead_band.stiction", &parts_of(SHORT_STARTS, [0.75, 0.5, 0.25])),
-                ("valve_dead_band.play", &parts_of(SHORT_STARTS, [0.25, 0.5, 0.75])),
-            ],
+            &[("valve_dead_band.stiction", &shares([0.5, 0.75])), ("valve_dead_band.play", &shares([0.5, 0.25]))],
         ],
         refinements: &[
             ("valve_dead_band.start", &[0.3]),
