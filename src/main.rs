@@ -411,6 +411,14 @@ fn progress(pieces: usize) -> ProgressBar {
     ProgressBar::new(pieces as u64).with_style(style)
 }
 
+/// What tells a bar that one more piece is done or begun, by its name.
+fn counting(bar: &ProgressBar) -> impl Fn(&str) + Sync {
+    |name| {
+        bar.set_message(name.to_owned());
+        bar.inc(1);
+    }
+}
+
 /// What a diagnosis is at, on stderr: how many fits it takes nobody knows.
 fn fits() -> ProgressBar {
     let style = ProgressStyle::with_template("{spinner} {elapsed}, fit {pos}: {wide_msg}").expect("a valid template");
@@ -526,10 +534,7 @@ fn run_comparison(
 
 fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {
     let fits = fits();
-    let found = diagnose(parameters, recordings, tolerance, &|effects| {
-        fits.set_message(effects.to_owned());
-        fits.inc(1);
-    })?;
+    let found = diagnose(parameters, recordings, tolerance, &counting(&fits))?;
     fits.finish_and_clear();
     let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
     let files = export::write_whole(files)?;
@@ -560,10 +565,7 @@ fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
     let task = arguments.task(&nominal)?;
     let tolerance = arguments.tolerance.or(task.tolerance).unwrap_or(diagnosis::DEFAULT_TOLERANCE);
     let bar = progress(plan::pieces(&limits));
-    let found = plan::plan(&task, &nominal, tolerance, &limits, &|name| {
-        bar.set_message(name.to_owned());
-        bar.inc(1);
-    })?;
+    let found = plan::plan(&task, &nominal, tolerance, &limits, &counting(&bar))?;
     bar.finish_and_clear();
     let files = export::write_whole(plan::files(&found, &nominal, &arguments.out))?;
     let mut json = plan::to_json(&found);
@@ -619,10 +621,7 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
 
 fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
     let bar = progress(closed_loop::pieces());
-    let evaluation = closed_loop::evaluate(plants as usize, &|name| {
-        bar.set_message(name.to_owned());
-        bar.inc(1);
-    })?;
+    let evaluation = closed_loop::evaluate(plants as usize, &counting(&bar))?;
     bar.finish_and_clear();
     let files = export::write_whole(closed_loop::files(&evaluation, out))?;
     let mut json = closed_loop::to_json(&evaluation);
@@ -632,10 +631,7 @@ fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
 
 fn run_reproduction(out: &Path) -> Result<Answer> {
     let bar = progress(reproduction::pieces());
-    let found = reproduction::reproduce(&|name| {
-        bar.set_message(name.to_owned());
-        bar.inc(1);
-    })?;
+    let found = reproduction::reproduce(&counting(&bar))?;
     bar.finish_and_clear();
     let files = export::write_whole(reproduction::files(&found, out))?;
     let mut json = reproduction::to_json(&found);
@@ -645,10 +641,7 @@ fn run_reproduction(out: &Path) -> Result<Answer> {
 
 fn run_demo(out: &Path) -> Result<Answer> {
     let fits = fits();
-    let made = demo::run(out, &|effects| {
-        fits.set_message(effects.to_owned());
-        fits.inc(1);
-    })?;
+    let made = demo::run(out, &counting(&fits))?;
     fits.finish_and_clear();
     let text = format!(
         "1. Exported the nominal FMUs to {nominal}.\n\

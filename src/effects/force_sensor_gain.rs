@@ -13,7 +13,8 @@ crate::variables::variables! {
     /// motion follows.
     ///
     /// # Validity
-    /// Constant over a recording, or settling while the amplifier warms up from its start, in every recording alike; slightly bent scales; the curvature is that of a cell or an amplifier whose scale falls with the force.
+    /// Constant over a recording, or settling while the amplifier warms up from its start, in every recording alike; slightly bent scales; the
+    /// curvature is that of a cell or an amplifier whose scale falls with the force.
     ///
     /// # Reference
     /// Definition of a gain; linearity errors in data sheets of sensors (up to 1 % of full scale).

@@ -684,7 +684,42 @@ impl Effects {
 
 #[cfg(test)]
 mod tests {
-    use super::Effects;
+    use super::{Effects, Point, Readings};
+
+    #[test]
+    fn a_curved_scale_is_a_cubic_through_its_error_at_the_middle() {
+        let mut effects = Effects::default();
+        let own = &mut effects.force_sensor_gain;
+        (own.relative_error, own.bend, own.curvature) = (-0.06, 0.01, -0.02);
+        // F = r 400 N reads 400 (r (1 − 0.06 − 0.01 + 0.02) + 0.01 r² − 0.02 r³).
+        for (ratio, reading) in [(0.0, 0.0), (0.5, 190.0), (1.0, 376.0), (2.0, 712.0)] {
+            let force = 400.0 * ratio;
+            let shown = effects.readings(Readings { time: 0.0, contraction: 0.0, gauge_pressure: 0.0, force });
+            assert!((shown.force - reading).abs() < 1e-9, "{ratio}: {}", shown.force);
+        }
+    }
+
+    #[test]
+    fn a_port_stays_shut_for_small_errors_behind_a_second_pole_too() {
+        let mut effects = Effects::default();
+        effects.valve_lag.second_time_constant = 0.05;
+        effects.valve_dead_band.pressure_overlap = 5e3;
+        let at = |gauge_pressure| Point { gauge_pressure, ..Point::default() };
+        let behind_pole = effects.start(&at(2.03e5));
+        assert_eq!(effects.target_pressure(&at(2e5), &behind_pole, 3e5), 2e5);
+        assert_eq!(effects.target_pressure(&at(1.9e5), &behind_pole, 3e5), 1.98e5);
+    }
+
+    #[test]
+    fn a_frame_stretches_by_the_true_pull_whatever_a_warm_sensor_shows() {
+        let readings = Readings { time: 1e3, contraction: 0.1, gauge_pressure: 2e5, force: 400.0 };
+        let mut effects = Effects::default();
+        effects.series_elasticity.compliance = 1e-5;
+        let cold = effects.readings(readings);
+        effects.temperature_drift.force_zero = 50.0;
+        let warm = effects.readings(readings);
+        assert!(warm.force > cold.force && warm.contraction == cold.contraction && cold.contraction != 0.1);
+    }
 
     #[test]
     fn what_ends_at_a_bound_is_no_cause_but_for_limits_of_nature() {

@@ -10,7 +10,8 @@ crate::variables::variables! {
     /// wider by b u, as friction that the pressure presses on. Stiction: it rests until
     /// |u − w| reaches `stiction`, and jumps to where u is after `jump_time`; it sticks again at once or, where u is faster than
     /// `sliding_speed`, once u turns. Behind a play of (S − J)/2, a stiction of J then makes the band S and the slip jump J of
-    /// Choudhury, and without sliding a play of f_d and a stiction of f_s − f_d the pilot of He, which moves from f_s on and falls short by f_d. Overlap: the spool opens no port while the
+    /// Choudhury, and without sliding a play of f_d and a stiction of f_s − f_d the pilot of He, which moves from f_s on and falls
+    /// short by f_d. Overlap: the spool opens no port while the
     /// pressure is off its target by less than `pressure_overlap` h; beyond, the valve goes for the share
     /// min(|e|, s (|e| − h)) of that error e, `overlap_steepness` s: for one it misses the target by h, for more the port
     /// opens the more abruptly. Rounded edges let |e| − h set in gradually, about a share of h around it: `overlap_rounding`. The port for

@@ -57,9 +57,8 @@ impl Rival {
         // A single experiment has no second recording.
         let forms = effect.forms.iter().filter(|form| form.iter().all(|(name, _)| recordings_for(name) == 1));
         let variants = forms.flat_map(|form| (0..count_starts(form.iter())).map(|k| at_start(nominal, form.iter(), k)));
-        let usual = effect.forms[0];
-        let free = usual.iter().map(|(name, _)| declared(nominal, name).0).collect();
-        let model = at_start(nominal, usual.iter(), 0);
+        let free = effect.typical().map(|(name, _)| declared(nominal, name).0).collect();
+        let model = at_start(nominal, effect.forms[0].iter(), 0);
         Self { name: effect.name, model, free, variants: variants.collect() }
     }
 

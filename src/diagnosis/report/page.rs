@@ -25,6 +25,7 @@ pub fn html(
     let residuals = Residuals::new(diagnosis, nominal, recordings);
     let exposed = residuals.exposed(diagnosis);
     let most = most_samples(recordings.len());
+    let models = if diagnosis.extended == *nominal { 1 } else { 2 };
     let (mut curves, mut of_recordings, mut static_plots) = (Vec::new(), Vec::new(), Vec::new());
     for (index, (recording, replays)) in recordings.iter().zip(replays).enumerate() {
         let signals = compared(recording, &replays[0]);
@@ -36,8 +37,7 @@ pub fn html(
             "dots": residuals.dots(index, &exposed),
         }));
         of_recordings.push(recording_context(recording, &signals, held_out, most));
-        let is_extended = diagnosis.extended != *nominal;
-        static_plots.extend(pictures::time_plots(recording, if is_extended { replays } else { &replays[..1] }));
+        static_plots.extend(pictures::time_plots(recording, &replays[..models]));
     }
     let data = json!({ "axes": residuals.axes(diagnosis), "recordings": curves });
     let causes = diagnosis.causes.iter().zip(&exposed);
