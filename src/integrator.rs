@@ -7,7 +7,7 @@
 //!
 //! # Reference
 //! J. Dormand, P. Prince (1980), A family of embedded Runge–Kutta formulae, doi 10.1016/0771-050X(80)90013-3;
-//! E. Hairer, S. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, II.4.
+//! E. Hairer, S. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, II.4 and II.6.
 
 /// Error of one step, relative to the scale of each state, that is accepted where nothing else is asked for.
 pub const TOLERANCE: f64 = 5e-9;
@@ -31,6 +31,17 @@ const C: [f64; 6] = [1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
+/// Coefficients of the solution within a step, which is of order four (Hairer et al., II.6).
+const D: [f64; 7] = [
+    -12715105075.0 / 11282082432.0,
+    0.0,
+    87487479700.0 / 32700410799.0,
+    -10690763975.0 / 1880347072.0,
+    701980252875.0 / 199316789632.0,
+    -1453857185.0 / 822651844.0,
+    69997945.0 / 29380423.0,
+];
+
 /// Integration left the range of numbers, no step was small enough, or there were too many.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Failed {
@@ -42,8 +53,8 @@ pub struct Failed {
 
 /// Advances `state` over `duration` seconds.
 ///
-/// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness(t0, y0, t1, y1)` is
-/// told of every accepted step; `scale` is the usual size of each state, and `tolerance` the error of one step relative to
+/// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness(t0, y0, t1, y1, y)` is
+/// told of every accepted step, with the solution `y(t)` within it; `scale` is the usual size of each state, and `tolerance` the error of one step relative to
 /// it; `step` is the step proposed by the last call and is updated.
 ///
 /// # Errors
@@ -52,7 +63,7 @@ pub struct Failed {
 #[inline]
 pub fn advance<const N: usize>(
     rates: impl Fn(f64, &[f64; N], &mut [f64; N]),
-    mut witness: impl FnMut(f64, &[f64; N], f64, &[f64; N]),
+    mut witness: impl FnMut(f64, &[f64; N], f64, &[f64; N], &dyn Fn(f64) -> [f64; N]),
     scale: &[f64; N],
     tolerance: f64,
     state: &mut [f64; N],
@@ -71,7 +82,8 @@ pub fn advance<const N: usize>(
         let (error, worst) = scaled_error(&stages, h, scale, state, &next);
         let error = error / tolerance;
         if error <= 1.0 {
-            witness(time, state, time + h, &next);
+            let within = |t: f64| within_step((t - time) / h, h, state, &next, &stages);
+            witness(time, state, time + h, &next, &within);
             *state = next;
             time += h;
             stages[0] = stages[6]; // first same as last
@@ -115,6 +127,22 @@ fn one_step<const N: usize>(
         rates(time + C[s] * h, &trial, &mut stages[s + 1]);
     }
     trial // the last stage is the solution of order five
+}
+
+/// Solution at a share of a step.
+fn within_step<const N: usize>(
+    share: f64,
+    h: f64,
+    state: &[f64; N],
+    next: &[f64; N],
+    stages: &[[f64; N]; 7],
+) -> [f64; N] {
+    let bend = combined(&D, stages);
+    std::array::from_fn(|i| {
+        let whole = next[i] - state[i];
+        let [first, last] = [0, 6].map(|stage: usize| h * stages[stage][i] - whole);
+        state[i] + share * (whole + (1.0 - share) * (first + share * (-last - first + (1.0 - share) * h * bend[i])))
+    })
 }
 
 /// Sum of the stages, weighted. State by state inside, so that the compiler can do several at once.
@@ -166,7 +194,7 @@ mod tests {
         for call in [1e-4, 1e-3, 1e-2, 0.25, 1.0] {
             let (mut state, mut step) = ([1.0, 0.0, 1.0], 1e-3);
             for _ in 0..(1.0_f64 / call).round() as usize {
-                advance(rates, |_, _, _, _| {}, &[1.0, 10.0, 1.0], TOLERANCE, &mut state, &mut step, call).unwrap();
+                advance(rates, |_, _, _, _, _| {}, &[1.0, 10.0, 1.0], TOLERANCE, &mut state, &mut step, call).unwrap();
             }
             let exact = [10.0_f64.cos(), -10.0 * 10.0_f64.sin(), (-3.0_f64).exp()];
             for (is, should) in state.iter().zip(exact) {
@@ -176,15 +204,33 @@ mod tests {
     }
 
     #[test]
+    fn the_solution_within_a_step_is_of_order_four() {
+        let largest_error = |h: f64| {
+            let mut most = 0.0_f64;
+            let witness = |_: f64, _: &[f64; 3], _: f64, _: &[f64; 3], within: &dyn Fn(f64) -> [f64; 3]| {
+                for k in 0..=10 {
+                    let t = h * f64::from(k) / 10.0;
+                    let exact = [(10.0 * t).cos(), -10.0 * (10.0 * t).sin(), (-3.0 * t).exp()];
+                    most = within(t).iter().zip(exact).fold(most, |most, (is, should)| most.max((is - should).abs()));
+                }
+            };
+            advance(rates, witness, &[1.0, 10.0, 1.0], 1.0, &mut [1.0, 0.0, 1.0], &mut h.clone(), h).unwrap();
+            most
+        };
+        let (whole, half) = (largest_error(0.04), largest_error(0.02));
+        assert!(half < 1e-5 && (whole / half).log2() > 4.5, "{whole} {half}");
+    }
+
+    #[test]
     fn an_explosion_is_reported_with_its_time() {
         let explode = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = y[0] * y[0];
-        let failed = advance(explode, |_, _, _, _| {}, &[1.0], TOLERANCE, &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
+        let failed = advance(explode, |_, _, _, _, _| {}, &[1.0], TOLERANCE, &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
         assert!((failed.after - 1.0).abs() < 1e-3, "1/(1 - t) ends at 1 s, not {}", failed.after);
     }
 
     #[test]
     fn a_stiffness_without_sense_ends() {
         let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e12 * y[0];
-        assert!(advance(stiff, |_, _, _, _| {}, &[1.0], TOLERANCE, &mut [1.0], &mut 1e-3, 1.0).is_err());
+        assert!(advance(stiff, |_, _, _, _, _| {}, &[1.0], TOLERANCE, &mut [1.0], &mut 1e-3, 1.0).is_err());
     }
 }

@@ -39,7 +39,7 @@ pub trait State: Copy + Send {
     fn advance(
         &mut self,
         rates: impl Fn(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self),
+        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         tolerance: f64,
         step: &mut f64,
@@ -53,7 +53,7 @@ pub trait State: Copy + Send {
     fn advance_own(
         &mut self,
         rates: impl Fn(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self),
+        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         tolerance: f64,
         step: &mut f64,
@@ -75,7 +75,7 @@ impl<const N: usize> State for [f64; N] {
     fn advance(
         &mut self,
         rates: impl Fn(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self),
+        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         tolerance: f64,
         step: &mut f64,
@@ -115,7 +115,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
     fn advance(
         &mut self,
         rates: impl Fn(f64, &Self, &mut Self),
-        mut witness: impl FnMut(f64, &Self, f64, &Self),
+        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         tolerance: f64,
         step: &mut f64,
@@ -126,14 +126,16 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
             rates(t, &Self(*state), &mut all);
             *out = all.0;
         };
-        let witness = |t0: f64, y0: &[f64; N], t1: f64, y1: &[f64; N]| witness(t0, &Self(*y0), t1, &Self(*y1));
+        let witness = |t0: f64, y0: &[f64; N], t1: f64, y1: &[f64; N], within: &dyn Fn(f64) -> [f64; N]| {
+            witness(t0, &Self(*y0), t1, &Self(*y1), &|t| Self(within(t)));
+        };
         self.0.advance(rates, witness, &scale.0, tolerance, step, duration)
     }
     #[inline]
     fn advance_own(
         &mut self,
         rates: impl Fn(f64, &Self, &mut Self),
-        mut witness: impl FnMut(f64, &Self, f64, &Self),
+        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         tolerance: f64,
         step: &mut f64,
@@ -145,8 +147,8 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
             rates(t, &resting.with_own(own), &mut all);
             *out = all.own();
         };
-        let witness = |t0: f64, y0: &[f64; OWN], t1: f64, y1: &[f64; OWN]| {
-            witness(t0, &resting.with_own(y0), t1, &resting.with_own(y1));
+        let witness = |t0: f64, y0: &[f64; OWN], t1: f64, y1: &[f64; OWN], within: &dyn Fn(f64) -> [f64; OWN]| {
+            witness(t0, &resting.with_own(y0), t1, &resting.with_own(y1), &|t| resting.with_own(&within(t)));
         };
         own.advance(rates, witness, &scale.own(), tolerance, step, duration)?;
         *self = resting.with_own(&own);
@@ -189,7 +191,7 @@ pub trait System: Copy + Send + 'static {
     /// Names of the states, for messages; effects add theirs behind.
     const STATE_NAMES: &'static [&'static str];
     /// Inputs.
-    type Inputs: Signals;
+    type Inputs: Signals + PartialEq;
     /// Outputs.
     type Outputs: Signals;
     /// State.
@@ -244,6 +246,10 @@ pub trait System: Copy + Send + 'static {
     }
     /// Takes note of what the state has become between two times in s.
     fn witness(_memory: &mut Self::Memory, _parameters: &Parameters, _times: [f64; 2], _states: [&Self::State; 2]) {}
+    /// Whether it remembers what only steps as short as between samples tell precisely enough.
+    fn remembers_finely(_parameters: &Parameters) -> bool {
+        false
+    }
     /// Forgets what does not matter from a time in s on.
     fn forget(_memory: &mut Self::Memory, _parameters: &Parameters, _time: f64) {}
 }
@@ -255,6 +261,13 @@ pub struct Clock {
     pub time: f64,
     /// At the start, s.
     pub start: f64,
+}
+
+impl Clock {
+    /// A span in s later.
+    fn later(self, span: f64) -> Self {
+        Self { time: self.time + span, ..self }
+    }
 }
 
 /// A communication step.
@@ -422,8 +435,16 @@ impl<S: System> Simulator<S> {
     /// # Errors
     /// [`Error::Diverged`], [`Error::TooManySteps`]; nothing has changed then.
     pub fn advance(&mut self, duration: f64) -> Result<()> {
+        self.advance_past(duration, &[], &mut |_| {})
+    }
+
+    /// The same, with the outputs at some instants, in s from now, on the way; they are sorted.
+    ///
+    /// # Errors
+    /// As [`Simulator::advance`].
+    pub fn advance_past(&mut self, duration: f64, instants: &[f64], see: &mut dyn FnMut(S::Outputs)) -> Result<()> {
         let mark = self.memory.mark(self.clock.time);
-        let (state, step) = match self.integrate(duration) {
+        let (state, step) = match self.integrate(duration, instants, see) {
             Ok(arrived) => arrived,
             Err(error) => {
                 self.memory.roll_back(mark);
@@ -439,44 +460,39 @@ impl<S: System> Simulator<S> {
     }
 
     /// State and proposed step after a duration in s. Of the simulator only its memory goes along.
-    fn integrate(&mut self, duration: f64) -> Result<(S::State, f64)> {
-        let Self {
-            ref parameters,
-            inputs,
-            slopes,
-            tolerance,
-            clock: Clock { time, .. },
-            mut state,
-            mut step,
-            ref mut memory,
-        } = *self;
+    fn integrate(
+        &mut self,
+        duration: f64,
+        instants: &[f64],
+        see: &mut dyn FnMut(S::Outputs),
+    ) -> Result<(S::State, f64)> {
+        let Self { ref parameters, inputs, slopes, tolerance, clock, mut state, mut step, ref mut memory } = *self;
+        let time = clock.time;
         let coming = Step { parameters, time, state, inputs, slopes, duration };
         let extent = S::extent(parameters);
         S::expect(memory, &coming);
+        let mut instants = instants.iter().copied().peekable();
         let mut after = 0.0;
         while after < duration {
-            let (felt, slopes, span) = S::felt(memory, &coming, after);
+            let (felt, felt_slopes, span) = S::felt(memory, &coming, after);
+            let nominal_rates = |t: f64, y: &S::State, dy: &mut S::State| {
+                S::nominal_rates(parameters, &felt.along(&felt_slopes, t), y, dy);
+            };
+            let rates = |t: f64, y: &S::State, dy: &mut S::State| {
+                S::rates(parameters, &felt.along(&felt_slopes, t), y, dy);
+            };
+            let start = time + after;
+            let witness = |t0: f64, y0: &S::State, t1: f64, y1: &S::State, within: &dyn Fn(f64) -> S::State| {
+                S::witness(memory, parameters, [start + t0, start + t1], [y0, y1]);
+                while let Some(instant) = instants.next_if(|instant| instant - after < t1) {
+                    let (clock, inputs) = (clock.later(instant), inputs.along(&slopes, instant));
+                    see(S::outputs(parameters, clock, &inputs, &within(instant - after), memory));
+                }
+            };
             let passed = match extent {
-                Extent::Nominal => {
-                    let rates = |t: f64, y: &S::State, dy: &mut S::State| {
-                        S::nominal_rates(parameters, &felt.along(&slopes, t), y, dy);
-                    };
-                    state.advance_own(rates, |_, _, _, _| {}, &S::SCALE, tolerance, &mut step, span)
-                }
-                Extent::Stateless | Extent::Full => {
-                    let rates = |t: f64, y: &S::State, dy: &mut S::State| {
-                        S::rates(parameters, &felt.along(&slopes, t), y, dy);
-                    };
-                    let start = time + after;
-                    let witness = |t0: f64, y0: &S::State, t1: f64, y1: &S::State| {
-                        S::witness(memory, parameters, [start + t0, start + t1], [y0, y1]);
-                    };
-                    if extent == Extent::Full {
-                        state.advance(rates, witness, &S::SCALE, tolerance, &mut step, span)
-                    } else {
-                        state.advance_own(rates, witness, &S::SCALE, tolerance, &mut step, span)
-                    }
-                }
+                Extent::Nominal => state.advance_own(nominal_rates, witness, &S::SCALE, tolerance, &mut step, span),
+                Extent::Stateless => state.advance_own(rates, witness, &S::SCALE, tolerance, &mut step, span),
+                Extent::Full => state.advance(rates, witness, &S::SCALE, tolerance, &mut step, span),
             };
             passed.map_err(|failed| diverged::<S>(time + after, &failed))?;
             // On, even where a passage is shorter than rounding.
@@ -498,7 +514,7 @@ impl<S: System> Simulator<S> {
         for (value, rate) in state.as_mut_slice().iter_mut().zip(rates.as_slice()) {
             *value += rate * span;
         }
-        let clock = Clock { time: self.clock.time + span, ..self.clock };
+        let clock = self.clock.later(span);
         S::outputs(&self.parameters, clock, &self.inputs.along(&self.slopes, span), &state, &self.memory)
     }
 }

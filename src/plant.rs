@@ -529,6 +529,10 @@ impl System for PneumaticMuscle {
         }
     }
 
+    fn remembers_finely(parameters: &Parameters) -> bool {
+        remembers_contraction(parameters)
+    }
+
     #[inline]
     fn forget(memory: &mut PlantMemory, parameters: &Parameters, time: f64) {
         forget(memory, parameters, time);
@@ -573,11 +577,16 @@ fn expect_command<S: System>(memory: &mut PlantMemory, step: &Step<'_, S>, comma
 
 /// Begins to remember the contraction, in m now, where its sensor is late, and ends where it is not.
 fn expect_contraction<S: System>(memory: &mut PlantMemory, step: &Step<'_, S>, contraction: f64) {
-    let effects = &step.parameters.effects;
-    match effects.contraction_reach() + effects.contraction_filter() {
-        0.0 => *memory.contraction() = Default::default(),
-        _ => memory.contraction().begin(step.time, contraction),
+    if remembers_contraction(step.parameters) {
+        memory.contraction().begin(step.time, contraction);
+    } else {
+        *memory.contraction() = Default::default();
     }
+}
+
+/// Whether the sensor of the contraction is late.
+fn remembers_contraction(parameters: &Parameters) -> bool {
+    parameters.effects.contraction_reach() + parameters.effects.contraction_filter() != 0.0
 }
 
 /// The inputs as the valve feels them: their command is the one behind dead time and pilot.

@@ -38,6 +38,12 @@ impl Replay {
             _ => None,
         }
     }
+
+    fn push(&mut self, [gauge_pressure, contraction, force]: [f64; 3]) {
+        self.gauge_pressure.push(gauge_pressure);
+        self.contraction.push(contraction);
+        self.force.push(force);
+    }
 }
 
 /// Samples whose mean is taken as the pressure at the start where it moves; and longest time in s over which it is judged where it
@@ -294,23 +300,27 @@ fn follow<S: System>(
         simulator.initialize(0.0)?;
     }
     let mut replay = Replay { given: given.to_vec(), ..Replay::default() };
-    for k in 0..time.len() {
+    let may_skip = pull.is_none() && !S::remembers_finely(parameters);
+    let mut k = 0;
+    loop {
         match pull {
             None => simulator.inputs = inputs(k, 0.0),
             Some(pull) => force = balance(&mut simulator, |force| inputs(k, force), pull, force),
         }
-        let [gauge_pressure, contraction, reading] = shown(&simulator.outputs());
-        replay.gauge_pressure.push(gauge_pressure);
-        replay.contraction.push(contraction);
-        replay.force.push(reading);
-        if k + 1 < time.len() {
-            let span = time[k + 1] - time[k];
-            let difference = inputs(k + 1, force).along(&simulator.inputs, -1.0);
-            simulator.slopes = S::Inputs::default().along(&difference, 1.0 / span);
-            simulator.advance(span)?;
+        replay.push(shown(&simulator.outputs()));
+        if k + 1 == time.len() {
+            return Ok(replay);
         }
+        // While the inputs rest, the integration goes on over samples with steps as long as it likes.
+        let resting = (k + 1..time.len()).take_while(|&next| may_skip && inputs(next, 0.0) == simulator.inputs).count();
+        let next = k + resting.max(1);
+        let span = time[next] - time[k];
+        let difference = inputs(next, force).along(&simulator.inputs, -1.0);
+        simulator.slopes = S::Inputs::default().along(&difference, 1.0 / span);
+        let between: Vec<f64> = time[k + 1..next].iter().map(|time_between| time_between - time[k]).collect();
+        simulator.advance_past(span, &between, &mut |outputs| replay.push(shown(&outputs)))?;
+        k = next;
     }
-    Ok(replay)
 }
 
 /// Sets the inputs such that the muscle pulls with the force in N that they presuppose, and gives it; by secants from a

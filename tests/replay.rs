@@ -70,6 +70,28 @@ fn a_hanging_load_is_replayed() {
     }
 }
 
+/// Where a command rests, a replay takes samples from within longer steps: it comes to the same as from sample to sample.
+#[test]
+fn a_command_that_rests_is_replayed_as_one_that_does_not() {
+    let stairs = |k: usize| 1.2 + 0.35 * ((k / 150) as f64 * 2.1).sin();
+    for (effect, parameters) in cases() {
+        let replayed = |off: f64| {
+            let mut text = "time [s],command [V],gauge_pressure [Pa],contraction [m],load_mass [kg]\n".to_owned();
+            for k in 0..SAMPLES {
+                let command = stairs(k) + if k % 2 == 0 { off } else { 0.0 };
+                writeln!(text, "{},{command},120000,0.1,20", STEP * k as f64).unwrap();
+            }
+            replay(&parameters, &parse(&text)).unwrap()
+        };
+        let (long, short) = (replayed(0.0), replayed(1e-13));
+        for (signal, close) in [(Signal::GaugePressure, 0.2), (Signal::Contraction, 2e-7), (Signal::Force, 1e-3)] {
+            let pairs = long.get(signal).unwrap().iter().zip(short.get(signal).unwrap());
+            let difference = pairs.fold(0.0, |largest, (one, other)| (one - other).abs().max(largest));
+            assert!(difference < close, "{} {signal:?} {difference}", effect.name);
+        }
+    }
+}
+
 #[test]
 fn a_prescribed_motion_is_replayed() {
     // At rest at first, too, and gently out of it: a limited flow lets the pressure follow the motion.
