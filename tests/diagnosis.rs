@@ -65,7 +65,7 @@ fn a_pressure_that_tells_the_start_only_roughly_is_no_cause() {
 fn friction_is_found_with_its_size() {
     // The generator rubs with 12.67 N/bar in five Maxwell elements, the model with one of Dahl's.
     for names in [&["dry_friction_20kg.csv", "dry_friction_60kg.csv"][..], &["dry_friction_20kg.csv"]] {
-        let recordings: Vec<_> = names.iter().map(|name| as_it_is(name)).collect();
+        let recordings = numbered(names.iter().map(|name| as_it_is(name)).collect());
         let found = diagnosis_of(&recordings);
         assert_eq!(causes(&found), ["friction_hysteresis"], "{names:?}");
         let value = |name: &str| found.extended.get(&format!("friction_hysteresis.{name}")).unwrap();
