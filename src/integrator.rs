@@ -54,8 +54,8 @@ pub struct Failed {
 /// Advances `state` over `duration` seconds.
 ///
 /// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness(t0, y0, t1, y1, y)` is
-/// told of every accepted step, with the solution `y(t)` within it; `scale` is the usual size of each state, and `tolerance` the error of one step relative to
-/// it; `step` is the step proposed by the last call and is updated.
+/// told of every accepted step, with the solution `y(t)` within it; `scale` is the usual size of each state, and
+/// `tolerance` the error of one step relative to it; `step` is the step proposed by the last call and is updated.
 ///
 /// # Errors
 /// [`Failed`] when a state is not finite, the step would fall below a nanosecond, or the steps are too many; `state` is

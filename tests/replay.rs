@@ -35,8 +35,11 @@ fn parse(text: &str) -> Recording {
 fn difference(parameters: &Parameters, recording: &Recording, signal: Signal) -> f64 {
     let replayed = replay(parameters, recording).unwrap();
     let (simulated, measured) = (replayed.get(signal).unwrap(), recording.get(signal).unwrap());
-    let pairs = measured.iter().zip(simulated).take(SAMPLES - 20);
-    pairs.fold(0.0, |largest, (one, other)| (one - other).abs().max(largest))
+    largest_difference(&measured[..SAMPLES - 20], simulated)
+}
+
+fn largest_difference(some: &[f64], others: &[f64]) -> f64 {
+    some.iter().zip(others).fold(0.0, |largest, (one, other)| (one - other).abs().max(largest))
 }
 
 /// Every effect, in every form.
@@ -85,8 +88,7 @@ fn a_command_that_rests_is_replayed_as_one_that_does_not() {
         };
         let (long, short) = (replayed(0.0), replayed(1e-13));
         for (signal, close) in [(Signal::GaugePressure, 0.2), (Signal::Contraction, 2e-7), (Signal::Force, 1e-3)] {
-            let pairs = long.get(signal).unwrap().iter().zip(short.get(signal).unwrap());
-            let difference = pairs.fold(0.0, |largest, (one, other)| (one - other).abs().max(largest));
+            let difference = largest_difference(long.get(signal).unwrap(), short.get(signal).unwrap());
             assert!(difference < close, "{} {signal:?} {difference}", effect.name);
         }
     }
