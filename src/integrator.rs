@@ -13,6 +13,9 @@
 pub const TOLERANCE: f64 = 5e-9;
 const LARGEST_STEP: f64 = 0.05;
 const SMALLEST_STEP: f64 = 1e-9;
+/// Share of the step that the error allows which is taken, and the error below which no longer one is.
+const SAFETY: f64 = 0.9;
+const LEAST_ERROR: f64 = 1e-4;
 /// A call that needs more steps than this would keep its caller waiting for seconds: the parameters make no sense.
 const MOST_STEPS: usize = 10_000_000;
 
@@ -88,10 +91,11 @@ pub fn advance<const N: usize>(
             time += h;
             stages[0] = stages[6]; // first same as last
         }
-        let proposal = h * growth(error);
         // A step cut short by the end of the interval says nothing against the longer one.
-        if error > 1.0 || !last || proposal > *step {
-            *step = proposal.min(LARGEST_STEP);
+        if error > 1.0 || !last {
+            *step = (h * growth(error)).min(LARGEST_STEP);
+        } else if may_lengthen(error, h, *step) {
+            *step = step.max((h * growth(error)).min(LARGEST_STEP));
         }
         if error <= 1.0 && last {
             return Ok(());
@@ -107,7 +111,13 @@ pub fn advance<const N: usize>(
 #[inline]
 fn growth(error: f64) -> f64 {
     // The power takes longer than all the rest of a step, and most steps are far better than they need be.
-    if error < 1e-4 { 5.0 } else { (0.9 * error.powf(-0.2)).clamp(0.2, 5.0) }
+    if error < LEAST_ERROR { 5.0 } else { (SAFETY * error.powf(-0.2)).clamp(0.2, 5.0) }
+}
+
+/// Whether the step after one of length h with an error may be longer than another one; where not, its power is not worth its time.
+#[inline]
+fn may_lengthen(error: f64, h: f64, step: f64) -> bool {
+    error < LEAST_ERROR || error < 1.001 * (SAFETY * h / step).powi(5)
 }
 
 #[inline]

@@ -61,6 +61,24 @@ pub trait State: Copy + Send {
     ) -> std::result::Result<(), integrator::Failed> {
         self.advance(rates, witness, scale, tolerance, step, duration)
     }
+    /// As [`State::advance`], while of the states of effects only those move whose bits are set.
+    ///
+    /// # Errors
+    /// As [`integrator::advance`].
+    #[inline]
+    #[allow(clippy::too_many_arguments)]
+    fn advance_moving(
+        &mut self,
+        _moving: u64,
+        rates: impl Fn(f64, &Self, &mut Self),
+        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        scale: &Self,
+        tolerance: f64,
+        step: &mut f64,
+        duration: f64,
+    ) -> std::result::Result<(), integrator::Failed> {
+        self.advance(rates, witness, scale, tolerance, step, duration)
+    }
 }
 
 impl<const N: usize> State for [f64; N] {
@@ -154,6 +172,57 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         *self = resting.with_own(&own);
         Ok(())
     }
+    #[inline]
+    fn advance_moving(
+        &mut self,
+        moving: u64,
+        rates: impl Fn(f64, &Self, &mut Self),
+        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        scale: &Self,
+        tolerance: f64,
+        step: &mut f64,
+        duration: f64,
+    ) -> std::result::Result<(), integrator::Failed> {
+        const { assert!(FEW <= N && N <= u64::BITS as usize) };
+        let moving = moving << OWN | ((1 << OWN) - 1);
+        if moving.count_ones() as usize > FEW {
+            return self.advance(rates, witness, scale, tolerance, step, duration);
+        }
+        let (resting, positions) = (*self, positions(moving));
+        let of = |all: &Self| positions.map(|position| all.0[position]);
+        let with = |few: &[f64; FEW]| {
+            let mut all = resting;
+            positions.iter().zip(few).for_each(|(position, value)| all.0[*position] = *value);
+            all
+        };
+        let rates = |t: f64, few: &[f64; FEW], out: &mut [f64; FEW]| {
+            let mut all = Self::ZERO;
+            rates(t, &with(few), &mut all);
+            *out = of(&all);
+        };
+        let witness = |t0: f64, y0: &[f64; FEW], t1: f64, y1: &[f64; FEW], within: &dyn Fn(f64) -> [f64; FEW]| {
+            witness(t0, &with(y0), t1, &with(y1), &|t| with(&within(t)));
+        };
+        let mut few = of(self);
+        let arrived = few.advance(rates, witness, &of(scale), tolerance, step, duration);
+        arrived.map_err(|failed| integrator::Failed { state: failed.state.map(|few| positions[few]), ..failed })?;
+        *self = with(&few);
+        Ok(())
+    }
+}
+
+/// States that are integrated where no more than these move: the plant's own with those of any effect, or of several that have few.
+const FEW: usize = 12;
+
+/// Positions of the states whose bits are set and, as they are to be `FEW`, of others.
+fn positions(moving: u64) -> [usize; FEW] {
+    let mut rest = [moving, !moving];
+    std::array::from_fn(|_| {
+        let those = usize::from(rest[0] == 0);
+        let position = rest[those].trailing_zeros();
+        rest[those] &= rest[those] - 1;
+        position as usize
+    })
 }
 
 /// What of a system is at work besides its own equations.
@@ -163,8 +232,8 @@ pub enum Extent {
     Nominal,
     /// Effects without states.
     Stateless,
-    /// Effects with states.
-    Full,
+    /// Effects with states that move, each a bit by its position among those of all effects.
+    Full(u64),
 }
 
 /// Inputs as the equations feel them over a passage: at its start, their slopes, and how long it lasts in s.
@@ -492,7 +561,9 @@ impl<S: System> Simulator<S> {
             let passed = match extent {
                 Extent::Nominal => state.advance_own(nominal_rates, witness, &S::SCALE, tolerance, &mut step, span),
                 Extent::Stateless => state.advance_own(rates, witness, &S::SCALE, tolerance, &mut step, span),
-                Extent::Full => state.advance(rates, witness, &S::SCALE, tolerance, &mut step, span),
+                Extent::Full(moving) => {
+                    state.advance_moving(moving, rates, witness, &S::SCALE, tolerance, &mut step, span)
+                }
             };
             passed.map_err(|failed| diverged::<S>(time + after, &failed))?;
             // On, even where a passage is shorter than rounding.
@@ -713,5 +784,39 @@ impl<S: Registered> Model for Simulator<S> {
         }
         *self = restored;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A load on a spring, and effects of which the third and the last drive it and the others rest.
+    fn rates(_: f64, all: &Extended<2, 14>, rates: &mut Extended<2, 14>) {
+        let state = &all.0;
+        (rates.0[0], rates.0[1]) = (state[1], -40.0 * (state[0] - state[4] - state[13]));
+        (rates.0[4], rates.0[13]) = (-3.0 * state[4], 0.5 * (state[0] - state[13]));
+    }
+
+    #[test]
+    fn states_that_rest_make_no_difference_whether_they_are_integrated_or_not() {
+        let start = Extended(std::array::from_fn(|k| 1.0 / (k + 1) as f64));
+        let (mut all, mut moving) = (start, start);
+        let (mut step_of_all, mut step_of_moving) = (1e-3, 1e-3);
+        let mut instants = [Vec::new(), Vec::new()];
+        for _ in 0..20 {
+            let scale = Extended([1.0; 14]);
+            let [of_all, of_moving] = &mut instants;
+            let see = |seen: &mut Vec<[f64; 14]>, t1: f64, within: &dyn Fn(f64) -> Extended<2, 14>| {
+                seen.push(within(0.5 * t1).0);
+            };
+            let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_all, t1, within);
+            all.advance(rates, witness, &scale, 1e-8, &mut step_of_all, 0.1).unwrap();
+            let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_moving, t1, within);
+            let moves = 1 << 2 | 1 << 11;
+            moving.advance_moving(moves, rates, witness, &scale, 1e-8, &mut step_of_moving, 0.1).unwrap();
+        }
+        assert_eq!((all, step_of_all, &instants[0]), (moving, step_of_moving, &instants[1]));
+        assert!(all.0[13] != start.0[13] && all.0[12] == start.0[12] && !instants[0].is_empty());
     }
 }

@@ -98,11 +98,10 @@ crate::variables::signals! {
 /// What is at work of the effects.
 #[inline]
 fn extent(parameters: &Parameters) -> Extent {
-    let effects = &parameters.effects;
-    match (parameters.are_nominal(), effects.are_stateless()) {
+    match (parameters.are_nominal(), parameters.effects.moving()) {
         (true, _) => Extent::Nominal,
-        (false, true) => Extent::Stateless,
-        (false, false) => Extent::Full,
+        (false, 0) => Extent::Stateless,
+        (false, moving) => Extent::Full(moving),
     }
 }
 

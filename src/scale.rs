@@ -60,6 +60,37 @@ pub fn settled((excess, constant): (f64, f64), time: f64) -> f64 {
     if excess == 0.0 { 0.0 } else { excess * (-time.max(0.0) / constant).exp() }
 }
 
+/// How fits look for a sensor's scale that is off.
+macro_rules! forms_of_scale {
+    ($prefix:literal) => {
+        const FORMS: &'static [&'static [$crate::effects::Freed]] = &[
+            &[(concat!($prefix, "relative_error"), &[0.05, -0.05])],
+            // A gain alone may be what the coefficients of the muscle stand for.
+            &[(concat!($prefix, "bend"), &[0.02]), (concat!($prefix, "relative_error"), &[0.0])],
+        ];
+        const FURTHER_FORMS: &'static [&'static [$crate::effects::Freed]] = &[&[
+            (concat!($prefix, "relative_error"), &[0.05]),
+            (concat!($prefix, "settling"), &[0.02, -0.02, 0.02, -0.02]),
+            (concat!($prefix, "settling_time"), &[4.0, 4.0, 15.0, 15.0]),
+        ]];
+    };
+}
+pub(crate) use forms_of_scale;
+
+/// What an effect says of itself that is nothing but a scale.
+macro_rules! as_its_scale {
+    () => {
+        fn is_neutral(&self) -> bool {
+            self.scale().is_neutral()
+        }
+
+        fn own_course(&self, time: f64) -> f64 {
+            $crate::scale::settled(self.scale().settling, time)
+        }
+    };
+}
+pub(crate) use as_its_scale;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -32,6 +32,7 @@ pub mod units {
         ONE = "1", "Ratio", 1.0, [0, 0, 0, 0, 0];
         METRE = "m", "Length", 0.1, [0, 1, 0, 0, 0];
         SQUARE_METRE = "m2", "Area", 1e-3, [0, 2, 0, 0, 0];
+        NEWTON_PER_PASCAL = "N/Pa", "ForcePerPressure", 1e-3, [0, 2, 0, 0, 0];
         SECOND_PER_METRE = "s/m", "InverseVelocity", 10.0, [0, -1, 1, 0, 0];
         PER_METRE = "1/m", "Curvature", 1.0, [0, -1, 0, 0, 0];
         SECOND = "s", "Time", 1.0, [0, 0, 1, 0, 0];
@@ -120,6 +121,8 @@ pub struct Variable {
     pub role: Role,
     /// Real or enumeration.
     pub kind: Kind,
+    /// Which of several recordings it is of, by its number from 1; 0 where it is of all alike.
+    pub of_recording: usize,
 }
 
 impl Variable {
@@ -219,14 +222,15 @@ pub trait Signals: Declared + Copy + Default + Send {
     fn along(&self, slope: &Self, span: f64) -> Self;
 }
 
-/// Start, unit and range of every field of a group: `name: type = start, UNIT, min..=max;`.
+/// Start, unit and range of every field of a group: `name: type = start, UNIT, min..=max;`, with `of 2` behind the range where it is of the second
+/// of several recordings.
 macro_rules! variables {
     (
         $(#[$attribute:meta])*
         pub struct $Struct:ident in $prefix:literal as $role:ident {
             $(
                 #[doc = $description:literal]
-                $field:ident: $type:ty = $start:expr, $unit:ident, $range:expr;
+                $field:ident: $type:ty = $start:expr, $unit:ident, $range:expr $(, of $recording:literal)?;
             )*
         }
     ) => {
@@ -252,6 +256,7 @@ macro_rules! variables {
                     max: *$range.end(),
                     role: $crate::variables::Role::$role,
                     kind: <$type as $crate::variables::Scalar>::KIND,
+                    of_recording: 0 $(+ $recording)?,
                 },
             )*];
         }
@@ -330,6 +335,7 @@ macro_rules! signals {
                     max: f64::INFINITY,
                     role: $crate::variables::Role::$role,
                     kind: $crate::variables::Kind::Real,
+                    of_recording: 0,
                 },
             )*];
             fn get(&self, position: usize) -> f64 {

@@ -137,9 +137,9 @@ macro_rules! zero {
                 #[doc = $description]
                 offset: f64 = 0.0, $unit, (-$most..=$most);
                 /// By how much the offset is higher in the second of several recordings
-                second: f64 = 0.0, $unit, (-$most..=$most);
+                second: f64 = 0.0, $unit, (-$most..=$most), of 2;
                 /// By how much it is higher in the third
-                third: f64 = 0.0, $unit, (-$most..=$most);
+                third: f64 = 0.0, $unit, (-$most..=$most), of 3;
                 /// Which of the recordings is simulated: from the fourth on as the first
                 recording: f64 = 1.0, ONE, (1.0..=1000.0);
                 /// Excess of the offset at the start, which settles
@@ -153,11 +153,11 @@ macro_rules! zero {
                 /// Phase of the swing at the start, in rad
                 swing_phase: f64 = 0.0, ONE, (-10.0..=10.0);
                 /// By how much the offset shifts once, as after a shock, in the first of several recordings
-                shift: f64 = 0.0, $unit, (-$most..=$most);
+                shift: f64 = 0.0, $unit, (-$most..=$most), of 1;
                 /// By how much it shifts in the second
-                second_shift: f64 = 0.0, $unit, (-$most..=$most);
+                second_shift: f64 = 0.0, $unit, (-$most..=$most), of 2;
                 /// By how much it shifts in the third
-                third_shift: f64 = 0.0, $unit, (-$most..=$most);
+                third_shift: f64 = 0.0, $unit, (-$most..=$most), of 3;
                 /// When it shifts: the middle of the shift
                 shift_time: f64 = 10.0, SECOND, (0.0..=10000.0);
                 /// How long the shift takes
@@ -205,6 +205,24 @@ macro_rules! zero {
     };
 }
 pub(crate) use zero;
+
+/// What an effect says of itself that is nothing but its course over time.
+macro_rules! as_its_course {
+    () => {
+        fn is_neutral(&self) -> bool {
+            self.course().is_neutral()
+        }
+
+        fn is_plausible(&self) -> bool {
+            self.course().is_plausible()
+        }
+
+        fn own_course(&self, time: f64) -> f64 {
+            self.course().at(time)
+        }
+    };
+}
+pub(crate) use as_its_course;
 
 /// Where fits of a swing start: periods in s, each with four phases.
 pub(crate) const PERIODS: &[f64] = &each_for::<20>(&[10.0, 16.0, 25.0, 40.0, 65.0], 4);

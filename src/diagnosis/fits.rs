@@ -2,7 +2,7 @@
 
 use super::hypothesis::{
     Hypothesis, Off, Part, Which, at_start, bounds, corrections, count_starts, declared, many_minima, neutralised,
-    recordings_for, with_values,
+    recording_of, with_values,
 };
 use super::residuals::{Data, Loss, Scope};
 use super::unlisted::Unlisted;
@@ -419,9 +419,9 @@ impl<'a> Bench<'a> {
         Which::those(effect.refinements, |_, name| self.means_something(name))
     }
 
-    /// Whether there are as many recordings as a parameter is for.
+    /// Whether there is the recording that a parameter is of.
     fn means_something(&self, name: &str) -> bool {
-        self.data.recordings().len() >= recordings_for(name)
+        self.data.recordings().len() >= recording_of(name)
     }
 
     /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.
@@ -441,7 +441,7 @@ impl<'a> Bench<'a> {
             return None;
         }
         // What is another one in each recording goes its own way there.
-        let anew = part.freed().filter(|(name, _)| recordings_for(name) > 1);
+        let anew = part.freed().filter(|(name, _)| recording_of(name) > 1);
         let neutral = |name| declared(&Parameters::default(), name);
         let without =
             anew.map(|(name, _)| neutral(name)).map(|(own, value)| with_values(&parameters, &[own], &[value]));

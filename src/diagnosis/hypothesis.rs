@@ -137,18 +137,9 @@ impl Part {
     }
 }
 
-/// How many recordings there must be for a parameter to mean anything: some hold in the second or in the third alone.
-pub fn recordings_for(name: &str) -> usize {
-    match name.split('.').next_back() {
-        Some("second" | "second_phase" | "second_start" | "second_shift") => 2,
-        Some("third" | "third_phase" | "third_start" | "third_shift") => 3,
-        _ => 1,
-    }
-}
-
-/// Whether a parameter makes so many recordings unlike: what shifts in the first one stays so in those that follow.
-pub fn tells_apart(name: &str, recordings: usize) -> bool {
-    recordings_for(name) > 1 || recordings > 1 && name.ends_with(".shift")
+/// Which of several recordings a parameter is of, by its number from 1; 0 where it is of all alike.
+pub fn recording_of(name: &str) -> usize {
+    declared(&Parameters::default(), name).0.of_recording
 }
 
 /// The most starts that any parameter has.

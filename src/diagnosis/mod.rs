@@ -30,7 +30,7 @@ use crate::parameters::Parameters;
 use crate::quality;
 use crate::variables::Declared;
 use fits::{Bench, Fitted};
-use hypothesis::{Off, Part, tells_apart};
+use hypothesis::{Off, Part, recording_of};
 use residuals::{Data, Scope};
 use selection::{Chosen, Judged, MOST_EFFECTS};
 use serde::Serialize;
@@ -255,7 +255,8 @@ fn unlisted(bench: &Bench, chosen: &Chosen) -> Option<Remaining> {
 
 /// How to simulate another recording than the first with causes that have values of their own there.
 fn of_several(chosen: &Chosen, recordings: &[Recording]) -> Option<String> {
-    let differ = |part: &&Part| part.freed().any(|(name, _)| tells_apart(name, recordings.len()));
+    // What shifts in the first recording stays so in those that follow.
+    let differ = |part: &&Part| recordings.len() > 1 && part.freed().any(|(name, _)| recording_of(name) > 0);
     let numbers = chosen.model.hypothesis.parts.iter().filter(differ);
     let numbers: Vec<_> = numbers.map(|part| format!("`{}.recording`", part.effect.name)).collect();
     let names: Vec<_> =

@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, REFERENCE_CONTRACTION, Readings};
-use crate::scale::{Scale, settled};
+use crate::scale::{Scale, as_its_scale, forms_of_scale};
 
 crate::variables::variables! {
     /// A position sensor whose scale is off.
@@ -29,6 +29,8 @@ crate::variables::variables! {
 }
 
 impl ContractionSensorGain {
+    forms_of_scale!("contraction_sensor_gain.");
+
     fn scale(&self) -> Scale {
         let Self { relative_error, bend, settling, settling_time } = *self;
         Scale {
@@ -51,28 +53,14 @@ impl Effect for ContractionSensorGain {
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[
-            &[("contraction_sensor_gain.relative_error", &[0.05, -0.05])],
-            // A gain alone may be what the coefficients of the muscle stand for.
-            &[("contraction_sensor_gain.bend", &[0.02]), ("contraction_sensor_gain.relative_error", &[0.0])],
-        ],
-        further_forms: &[&[
-            ("contraction_sensor_gain.relative_error", &[0.05]),
-            ("contraction_sensor_gain.settling", &[0.02, -0.02, 0.02, -0.02]),
-            ("contraction_sensor_gain.settling_time", &[4.0, 4.0, 15.0, 15.0]),
-        ]],
+        forms: Self::FORMS,
+        further_forms: Self::FURTHER_FORMS,
         refinements: &[("contraction_sensor_gain.bend", &[0.005])],
     };
     const ENDS_INSIDE: &'static [&'static str] =
         &["contraction_sensor_gain.bend", "contraction_sensor_gain.settling", "contraction_sensor_gain.settling_time"];
 
-    fn is_neutral(&self) -> bool {
-        self.scale().is_neutral()
-    }
-
-    fn own_course(&self, time: f64) -> f64 {
-        settled((self.settling, self.settling_time), time)
-    }
+    as_its_scale!();
 
     fn readings(&self, readings: Readings) -> Readings {
         Readings { contraction: self.scale().shown(readings.contraction, readings.time), ..readings }

@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, Readings};
-use crate::zero::zero;
+use crate::zero::{as_its_course, zero};
 
 zero! {
     /// A position sensor whose zero is not at the rest length.
@@ -50,17 +50,7 @@ impl Effect for ContractionSensorOffset {
         refinements: Self::REFINEMENTS,
     };
 
-    fn is_neutral(&self) -> bool {
-        self.course().is_neutral()
-    }
-
-    fn is_plausible(&self) -> bool {
-        self.course().is_plausible()
-    }
-
-    fn own_course(&self, time: f64) -> f64 {
-        self.course().at(time)
-    }
+    as_its_course!();
 
     fn readings(&self, readings: Readings) -> Readings {
         Readings { contraction: readings.contraction + self.course().at(readings.time), ..readings }

@@ -29,9 +29,9 @@ crate::variables::variables! {
         /// Change of the gain with the square of the force, per that of 400 N
         curvature: f64 = 0.0, ONE, (-0.03..=0.03);
         /// By how much more in the second of several recordings: it ages from one to the next
-        second: f64 = 0.0, ONE, (-0.5..=0.5);
+        second: f64 = 0.0, ONE, (-0.5..=0.5), of 2;
         /// By how much more in the third
-        third: f64 = 0.0, ONE, (-0.5..=0.5);
+        third: f64 = 0.0, ONE, (-0.5..=0.5), of 3;
         /// Which of the recordings is simulated: from the fourth on as the first
         recording: f64 = 1.0, ONE, (1.0..=1000.0);
         /// Share of the relative error that the elastic force has, too

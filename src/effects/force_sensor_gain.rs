@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings};
-use crate::scale::{Scale, settled};
+use crate::scale::{Scale, as_its_scale, forms_of_scale};
 
 crate::variables::variables! {
     /// A force sensor whose scale is off.
@@ -33,6 +33,8 @@ crate::variables::variables! {
 }
 
 impl ForceSensorGain {
+    forms_of_scale!("force_sensor_gain.");
+
     fn scale(&self) -> Scale {
         let Self { relative_error, bend, curvature, settling, settling_time } = *self;
         Scale { middle: REFERENCE_FORCE, relative_error, bend, curvature, settling: (settling, settling_time) }
@@ -49,16 +51,8 @@ impl Effect for ForceSensorGain {
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[
-            &[("force_sensor_gain.relative_error", &[0.05, -0.05])],
-            // A gain alone may be what the coefficients of the muscle stand for.
-            &[("force_sensor_gain.bend", &[0.02]), ("force_sensor_gain.relative_error", &[0.0])],
-        ],
-        further_forms: &[&[
-            ("force_sensor_gain.relative_error", &[0.05]),
-            ("force_sensor_gain.settling", &[0.02, -0.02, 0.02, -0.02]),
-            ("force_sensor_gain.settling_time", &[4.0, 4.0, 15.0, 15.0]),
-        ]],
+        forms: Self::FORMS,
+        further_forms: Self::FURTHER_FORMS,
         refinements: &[("force_sensor_gain.bend", &[0.005]), ("force_sensor_gain.curvature", &[0.002])],
     };
     const ENDS_INSIDE: &'static [&'static str] = &[
@@ -68,13 +62,7 @@ impl Effect for ForceSensorGain {
         "force_sensor_gain.settling_time",
     ];
 
-    fn is_neutral(&self) -> bool {
-        self.scale().is_neutral()
-    }
-
-    fn own_course(&self, time: f64) -> f64 {
-        settled((self.settling, self.settling_time), time)
-    }
+    as_its_scale!();
 
     fn readings(&self, readings: Readings) -> Readings {
         Readings { force: self.scale().shown(readings.force, readings.time), ..readings }

@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, Readings};
-use crate::zero::zero;
+use crate::zero::{as_its_course, zero};
 
 zero! {
     /// A force sensor that shows a force where there is none.
@@ -40,17 +40,7 @@ impl Effect for ForceSensorOffset {
         refinements: Self::REFINEMENTS,
     };
 
-    fn is_neutral(&self) -> bool {
-        self.course().is_neutral()
-    }
-
-    fn is_plausible(&self) -> bool {
-        self.course().is_plausible()
-    }
-
-    fn own_course(&self, time: f64) -> f64 {
-        self.course().at(time)
-    }
+    as_its_course!();
 
     fn readings(&self, readings: Readings) -> Readings {
         Readings { force: readings.force + self.course().at(readings.time), ..readings }

@@ -36,7 +36,7 @@ crate::variables::variables! {
         /// Half width of the loop at zero pressure and pull
         half_width: f64 = 0.0, NEWTON, (0.0..=300.0);
         /// Growth of the half width with gauge pressure
-        half_width_per_pressure: f64 = 0.0, SQUARE_METRE, (0.0..=1e-3);
+        half_width_per_pressure: f64 = 0.0, NEWTON_PER_PASCAL, (0.0..=1e-3);
         /// Growth of the half width with the pull, as of a cord around a bolt
         half_width_per_pull: f64 = 0.0, ONE, (0.0..=0.5);
         /// Relative growth of the half width with contraction, at 0.1 m: the threads cross at another angle there
@@ -60,9 +60,9 @@ crate::variables::variables! {
         /// Where in the loop the friction starts: -1 after lengthening, 1 after shortening
         start: f64 = 0.0, ONE, (-1.0..=1.0);
         /// By how much more in the second of several recordings: each begins with a past of its own
-        second_start: f64 = 0.0, ONE, (-2.0..=2.0);
+        second_start: f64 = 0.0, ONE, (-2.0..=2.0), of 2;
         /// By how much more in the third
-        third_start: f64 = 0.0, ONE, (-2.0..=2.0);
+        third_start: f64 = 0.0, ONE, (-2.0..=2.0), of 3;
         /// Which of the recordings is simulated: from the fourth on as the first
         recording: f64 = 1.0, ONE, (1.0..=1000.0);
     }

@@ -423,10 +423,18 @@ macro_rules! effects {
                 0.0
             }
 
-            /// Whether the states of all effects rest.
+            /// The states that move, each a bit by its position: those of effects that do not rest.
             #[inline]
-            pub fn are_stateless(&self) -> bool {
-                true $(&& ($Effect::STATE_SCALES.is_empty() || self.$field.rests()))*
+            pub fn moving(&self) -> u64 {
+                let (mut moving, mut position) = (0, 0);
+                $(
+                    if !$Effect::STATE_SCALES.is_empty() && !self.$field.rests() {
+                        moving |= ((1 << $Effect::STATE_SCALES.len()) - 1) << position;
+                    }
+                    position += $Effect::STATE_SCALES.len();
+                )*
+                let _ = position;
+                moving
             }
 
             /// The sentence of the effect with this name.

@@ -21,9 +21,9 @@ crate::variables::variables! {
         /// Mass beyond the entered one
         additional_mass: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
         /// By how much more in the second of several recordings
-        second: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
+        second: f64 = 0.0, KILOGRAM, (-500.0..=500.0), of 2;
         /// By how much more in the third
-        third: f64 = 0.0, KILOGRAM, (-500.0..=500.0);
+        third: f64 = 0.0, KILOGRAM, (-500.0..=500.0), of 3;
         /// Which of the recordings is simulated: from the fourth on as the first
         recording: f64 = 1.0, ONE, (1.0..=1000.0);
         /// Relative error of the entered mass

@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, REFERENCE_PRESSURE, Readings};
-use crate::scale::{Scale, settled};
+use crate::scale::{Scale, as_its_scale, forms_of_scale};
 
 crate::variables::variables! {
     /// A pressure sensor whose scale is off.
@@ -30,6 +30,8 @@ crate::variables::variables! {
 }
 
 impl PressureSensorGain {
+    forms_of_scale!("pressure_sensor_gain.");
+
     fn scale(&self) -> Scale {
         let Self { relative_error, bend, settling, settling_time } = *self;
         Scale { middle: REFERENCE_PRESSURE, relative_error, bend, curvature: 0.0, settling: (settling, settling_time) }
@@ -46,28 +48,14 @@ impl Effect for PressureSensorGain {
         reference: "definition",
         of_load: false,
         holds: Holds::Exactly,
-        forms: &[
-            &[("pressure_sensor_gain.relative_error", &[0.05, -0.05])],
-            // A gain alone may be what the coefficients of the muscle stand for.
-            &[("pressure_sensor_gain.bend", &[0.02]), ("pressure_sensor_gain.relative_error", &[0.0])],
-        ],
-        further_forms: &[&[
-            ("pressure_sensor_gain.relative_error", &[0.05]),
-            ("pressure_sensor_gain.settling", &[0.02, -0.02, 0.02, -0.02]),
-            ("pressure_sensor_gain.settling_time", &[4.0, 4.0, 15.0, 15.0]),
-        ]],
+        forms: Self::FORMS,
+        further_forms: Self::FURTHER_FORMS,
         refinements: &[("pressure_sensor_gain.bend", &[0.005])],
     };
     const ENDS_INSIDE: &'static [&'static str] =
         &["pressure_sensor_gain.bend", "pressure_sensor_gain.settling", "pressure_sensor_gain.settling_time"];
 
-    fn is_neutral(&self) -> bool {
-        self.scale().is_neutral()
-    }
-
-    fn own_course(&self, time: f64) -> f64 {
-        settled((self.settling, self.settling_time), time)
-    }
+    as_its_scale!();
 
     fn readings(&self, readings: Readings) -> Readings {
         Readings { gauge_pressure: self.scale().shown(readings.gauge_pressure, readings.time), ..readings }

@@ -49,13 +49,13 @@ crate::variables::variables! {
         /// Share of a period that is over at the start
         phase: f64 = 0.0, ONE, (-2.0..=3.0);
         /// By how much more of it is over in the second of several recordings
-        second_phase: f64 = 0.0, ONE, (-2.0..=3.0);
+        second_phase: f64 = 0.0, ONE, (-2.0..=3.0), of 2;
         /// By how much more of it is over in the third
-        third_phase: f64 = 0.0, ONE, (-2.0..=3.0);
+        third_phase: f64 = 0.0, ONE, (-2.0..=3.0), of 3;
         /// By how much the supply gives more in the second of several recordings
-        second: f64 = 0.0, PASCAL, (-NONE..=NONE);
+        second: f64 = 0.0, PASCAL, (-NONE..=NONE), of 2;
         /// By how much it gives more in the third
-        third: f64 = 0.0, PASCAL, (-NONE..=NONE);
+        third: f64 = 0.0, PASCAL, (-NONE..=NONE), of 3;
         /// Which of the recordings is simulated: from the fourth on as the first
         recording: f64 = 1.0, ONE, (1.0..=1000.0);
         /// Share of a period that the compressor runs

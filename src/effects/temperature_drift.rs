@@ -55,9 +55,9 @@ crate::variables::variables! {
         /// That time constant
         time_constant_2: f64 = 60.0, SECOND, (FASTEST..=3000.0);
         /// How warm the muscle is at the start of the second of several recordings
-        second: f64 = 0.0, ONE, (0.0..=1.0);
+        second: f64 = 0.0, ONE, (0.0..=1.0), of 2;
         /// How warm it is at the start of the third
-        third: f64 = 0.0, ONE, (0.0..=1.0);
+        third: f64 = 0.0, ONE, (0.0..=1.0), of 3;
         /// Which of the recordings is simulated: from the fourth on as the first
         recording: f64 = 1.0, ONE, (1.0..=1000.0);
     }

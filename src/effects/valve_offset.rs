@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, Point};
-use crate::zero::zero;
+use crate::zero::{as_its_course, zero};
 
 zero! {
     /// A valve whose zero is off.
@@ -41,17 +41,7 @@ impl Effect for ValveOffset {
     };
     const STATE_SCALES: &'static [f64] = &[1.0];
 
-    fn is_neutral(&self) -> bool {
-        self.course().is_neutral()
-    }
-
-    fn is_plausible(&self) -> bool {
-        self.course().is_plausible()
-    }
-
-    fn own_course(&self, time: f64) -> f64 {
-        self.course().at(time)
-    }
+    as_its_course!();
 
     fn rests(&self) -> bool {
         self.course().is_constant()

@@ -1,6 +1,6 @@
 //! What an experiment is to tell apart: models that a diagnosis left standing, or effects at a usual size.
 
-use crate::diagnosis::hypothesis::{at_start, count_starts, declared, recordings_for};
+use crate::diagnosis::hypothesis::{at_start, count_starts, declared, recording_of};
 use crate::effects::{Description, Effects};
 use crate::measurement::Signal;
 use crate::parameters::Parameters;
@@ -55,7 +55,7 @@ impl Rival {
     /// An effect at its usual size.
     fn usual(effect: &'static Description, nominal: &Parameters) -> Self {
         // A single experiment has no second recording.
-        let forms = effect.forms.iter().filter(|form| form.iter().all(|(name, _)| recordings_for(name) == 1));
+        let forms = effect.forms.iter().filter(|form| form.iter().all(|(name, _)| recording_of(name) <= 1));
         let variants = forms.flat_map(|form| (0..count_starts(form.iter())).map(|k| at_start(nominal, form.iter(), k)));
         let free = effect.typical().map(|(name, _)| declared(nominal, name).0).collect();
         let model = at_start(nominal, effect.forms[0].iter(), 0);

@@ -183,8 +183,7 @@ fn parameter_unit(parameter: &FittedParameter) -> (String, f64) {
     let (unit, size) = match parameter.unit {
         "m" => ("mm", 1e-3),
         "m/s" => ("mm/s", 1e-3),
-        // Newtons per pascal are square metres.
-        "m2" if parameter.name.ends_with("per_pressure") => ("N/bar", 1e-5),
+        "N/Pa" => ("N/bar", 1e-5),
         "m2" => ("cm²", 1e-4),
         "s" if largest < 1.0 => ("ms", 1e-3),
         "Pa" => ("bar", 1e5),
@@ -345,7 +344,7 @@ mod tests {
             let (unit, size) = parameter_unit(parameter);
             format!("{} {unit}", rounded_to(parameter.value / size, (parameter.high - parameter.low) / size))
         };
-        assert_eq!(shown(&parameter("friction_hysteresis.half_width_per_pressure", 1.267e-4, "m2")), "12.67 N/bar");
+        assert_eq!(shown(&parameter("friction_hysteresis.half_width_per_pressure", 1.267e-4, "N/Pa")), "12.67 N/bar");
         assert_eq!(shown(&parameter("valve_lag.time_constant", 0.05, "s")), "50.0 ms");
         assert_eq!(shown(&parameter("viscous_damping.contraction", -41.3, "N.s/m")), "−41.3 N s/m");
     }

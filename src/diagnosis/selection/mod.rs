@@ -264,8 +264,8 @@ impl<'a> Search<'a> {
         if worth > 0.0 { 1.0 - still / worth } else { 0.0 }
     }
 
-    /// The most promising hypotheses with one effect more than those of a level, the best first. Of the best, effects are exchanged for
-    /// others until no other one becomes the best by that.
+    /// The most promising hypotheses with one effect more than those of a level, the best first. Of the best, and of the best that can be, effects
+    /// are exchanged for others until no other one becomes the best by that.
     fn next_level(&self, level: &[Judged]) -> Vec<Judged> {
         let mut bases = carried_on(level);
         // What forms may leave is looked into only where the best leaves it.
@@ -278,17 +278,16 @@ impl<'a> Search<'a> {
             next = self.extended(level, &not_carried_on(level, &bases));
         }
         let mut exchanged_in: Vec<Vec<&str>> = Vec::new();
-        while let Some(best) = possible(&next).or(next.first()) {
-            let names = best.fitted.hypothesis.names();
-            if exchanged_in.contains(&names) {
-                break;
-            }
+        loop {
+            // Of what would be better but cannot be, one effect alone may be wrong.
+            let mut leading = possible(&next).into_iter().chain(next.first());
+            let is_new = |best: &&Judged| !exchanged_in.contains(&best.fitted.hypothesis.names());
+            let Some(best) = leading.find(is_new) else { return next };
+            exchanged_in.push(best.fitted.hypothesis.names());
             let others = self.exchanged(level, &next, best);
             next.extend(others);
             next = each_once(next);
-            exchanged_in.push(names);
         }
-        next
     }
 
     /// The hypotheses of some ranks of a level with one effect more, as far as they may be worth it.
