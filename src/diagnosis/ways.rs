@@ -62,6 +62,10 @@ pub fn better<'a>(
     }
     let wide = at_once.map_or_else(wide, Ok)?;
     let Some(mut other) = wide.searched(found.most_beside().min(AT_FIRST), fitting) else { return Ok(None) };
+    // Where another cause leads than was found, as many may be others.
+    if other.leads_away_from(&found) {
+        other.up_to(found.causes().min(AT_FIRST));
+    }
     // A third one takes minutes to find, and none is missing where two say all.
     if !other.says_all() {
         found.up_to(most);
@@ -101,6 +105,12 @@ impl<'a> Found<'a> {
     /// Whether nothing is wrong, so that nothing can be where the coefficients may be off in a way that allows more.
     pub fn finds_nothing(&self) -> bool {
         self.causes() == 0 && self.says_all()
+    }
+
+    /// Whether another effect than those that were found elsewhere does best alone.
+    fn leads_away_from(&self, other: &Self) -> bool {
+        let best = self.chosen.singles.first().map(|best| best.fitted.hypothesis.parts[0].effect.name);
+        best.is_some_and(|best| !other.chosen.best.hypothesis.has(best))
     }
 
     /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
