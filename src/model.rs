@@ -32,12 +32,14 @@ pub trait State: Copy + Send {
     fn as_slice(&self) -> &[f64];
     /// As a slice that can be changed.
     fn as_mut_slice(&mut self) -> &mut [f64];
-    /// See [`integrator::advance`].
+    /// See [`integrator::advance`]; of the states of effects only those move whose bits are set in `moving`, and the others rest.
     ///
     /// # Errors
     /// As [`integrator::advance`].
+    #[allow(clippy::too_many_arguments)]
     fn advance(
         &mut self,
+        moving: u64,
         rates: impl Fn(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
@@ -45,40 +47,6 @@ pub trait State: Copy + Send {
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed>;
-    /// As [`State::advance`], while the states of effects rest.
-    ///
-    /// # Errors
-    /// As [`integrator::advance`].
-    #[inline]
-    fn advance_own(
-        &mut self,
-        rates: impl Fn(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
-        scale: &Self,
-        tolerance: f64,
-        step: &mut f64,
-        duration: f64,
-    ) -> std::result::Result<(), integrator::Failed> {
-        self.advance(rates, witness, scale, tolerance, step, duration)
-    }
-    /// As [`State::advance`], while of the states of effects only those move whose bits are set.
-    ///
-    /// # Errors
-    /// As [`integrator::advance`].
-    #[inline]
-    #[allow(clippy::too_many_arguments)]
-    fn advance_moving(
-        &mut self,
-        _moving: u64,
-        rates: impl Fn(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
-        scale: &Self,
-        tolerance: f64,
-        step: &mut f64,
-        duration: f64,
-    ) -> std::result::Result<(), integrator::Failed> {
-        self.advance(rates, witness, scale, tolerance, step, duration)
-    }
 }
 
 impl<const N: usize> State for [f64; N] {
@@ -92,6 +60,7 @@ impl<const N: usize> State for [f64; N] {
     #[inline]
     fn advance(
         &mut self,
+        _moving: u64,
         rates: impl Fn(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
@@ -111,13 +80,32 @@ impl<const N: usize> State for [f64; N] {
 pub struct Extended<const OWN: usize, const N: usize>(pub [f64; N]);
 
 impl<const OWN: usize, const N: usize> Extended<OWN, N> {
-    fn own(&self) -> [f64; OWN] {
-        std::array::from_fn(|k| self.0[k])
-    }
-
-    fn with_own(mut self, own: &[f64; OWN]) -> Self {
-        self.0[..OWN].copy_from_slice(own);
-        self
+    /// Advances some of the states, while all others rest: `of` takes them out of all, `with` puts them there.
+    #[inline]
+    #[allow(clippy::too_many_arguments)]
+    fn advance_some<const M: usize>(
+        &mut self,
+        of: impl Fn(&Self) -> [f64; M],
+        with: impl Fn(&[f64; M]) -> Self,
+        rates: impl Fn(f64, &Self, &mut Self),
+        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        scale: &Self,
+        tolerance: f64,
+        step: &mut f64,
+        duration: f64,
+    ) -> std::result::Result<(), integrator::Failed> {
+        let rates = |t: f64, some: &[f64; M], out: &mut [f64; M]| {
+            let mut all = Self::ZERO;
+            rates(t, &with(some), &mut all);
+            *out = of(&all);
+        };
+        let witness = |t0: f64, y0: &[f64; M], t1: f64, y1: &[f64; M], within: &dyn Fn(f64) -> [f64; M]| {
+            witness(t0, &with(y0), t1, &with(y1), &|t| with(&within(t)));
+        };
+        let mut some = of(self);
+        some.advance(0, rates, witness, &of(scale), tolerance, step, duration)?;
+        *self = with(&some);
+        Ok(())
     }
 }
 
@@ -132,82 +120,42 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
     #[inline]
     fn advance(
         &mut self,
-        rates: impl Fn(f64, &Self, &mut Self),
-        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
-        scale: &Self,
-        tolerance: f64,
-        step: &mut f64,
-        duration: f64,
-    ) -> std::result::Result<(), integrator::Failed> {
-        let rates = |t: f64, state: &[f64; N], out: &mut [f64; N]| {
-            let mut all = Self::ZERO;
-            rates(t, &Self(*state), &mut all);
-            *out = all.0;
-        };
-        let witness = |t0: f64, y0: &[f64; N], t1: f64, y1: &[f64; N], within: &dyn Fn(f64) -> [f64; N]| {
-            witness(t0, &Self(*y0), t1, &Self(*y1), &|t| Self(within(t)));
-        };
-        self.0.advance(rates, witness, &scale.0, tolerance, step, duration)
-    }
-    #[inline]
-    fn advance_own(
-        &mut self,
-        rates: impl Fn(f64, &Self, &mut Self),
-        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
-        scale: &Self,
-        tolerance: f64,
-        step: &mut f64,
-        duration: f64,
-    ) -> std::result::Result<(), integrator::Failed> {
-        let (resting, mut own) = (*self, self.own());
-        let rates = |t: f64, own: &[f64; OWN], out: &mut [f64; OWN]| {
-            let mut all = Self::ZERO;
-            rates(t, &resting.with_own(own), &mut all);
-            *out = all.own();
-        };
-        let witness = |t0: f64, y0: &[f64; OWN], t1: f64, y1: &[f64; OWN], within: &dyn Fn(f64) -> [f64; OWN]| {
-            witness(t0, &resting.with_own(y0), t1, &resting.with_own(y1), &|t| resting.with_own(&within(t)));
-        };
-        own.advance(rates, witness, &scale.own(), tolerance, step, duration)?;
-        *self = resting.with_own(&own);
-        Ok(())
-    }
-    #[inline]
-    fn advance_moving(
-        &mut self,
         moving: u64,
         rates: impl Fn(f64, &Self, &mut Self),
-        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         tolerance: f64,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
         const { assert!(FEW <= N && N <= u64::BITS as usize) };
-        let moving = moving << OWN | ((1 << OWN) - 1);
-        if moving.count_ones() as usize > FEW {
-            return self.advance(rates, witness, scale, tolerance, step, duration);
+        let all_moving = moving << OWN | ((1 << OWN) - 1);
+        let resting = *self;
+        if moving == 0 {
+            let of = |all: &Self| -> [f64; OWN] { std::array::from_fn(|k| all.0[k]) };
+            let with = |own: &[f64; OWN]| {
+                let mut all = resting;
+                all.0[..OWN].copy_from_slice(own);
+                all
+            };
+            self.advance_some(of, with, rates, witness, scale, tolerance, step, duration)
+        } else if all_moving.count_ones() as usize <= FEW {
+            let positions = positions(all_moving);
+            let of = |all: &Self| positions.map(|position| all.0[position]);
+            let with = |few: &[f64; FEW]| {
+                let mut all = resting;
+                positions.iter().zip(few).for_each(|(position, value)| all.0[*position] = *value);
+                all
+            };
+            let arrived = self.advance_some(of, with, rates, witness, scale, tolerance, step, duration);
+            let named = |failed: integrator::Failed| integrator::Failed {
+                state: failed.state.map(|few| positions[few]),
+                ..failed
+            };
+            arrived.map_err(named)
+        } else {
+            self.advance_some(|all| all.0, |all| Self(*all), rates, witness, scale, tolerance, step, duration)
         }
-        let (resting, positions) = (*self, positions(moving));
-        let of = |all: &Self| positions.map(|position| all.0[position]);
-        let with = |few: &[f64; FEW]| {
-            let mut all = resting;
-            positions.iter().zip(few).for_each(|(position, value)| all.0[*position] = *value);
-            all
-        };
-        let rates = |t: f64, few: &[f64; FEW], out: &mut [f64; FEW]| {
-            let mut all = Self::ZERO;
-            rates(t, &with(few), &mut all);
-            *out = of(&all);
-        };
-        let witness = |t0: f64, y0: &[f64; FEW], t1: f64, y1: &[f64; FEW], within: &dyn Fn(f64) -> [f64; FEW]| {
-            witness(t0, &with(y0), t1, &with(y1), &|t| with(&within(t)));
-        };
-        let mut few = of(self);
-        let arrived = few.advance(rates, witness, &of(scale), tolerance, step, duration);
-        arrived.map_err(|failed| integrator::Failed { state: failed.state.map(|few| positions[few]), ..failed })?;
-        *self = with(&few);
-        Ok(())
     }
 }
 
@@ -230,10 +178,18 @@ fn positions(moving: u64) -> [usize; FEW] {
 pub enum Extent {
     /// Nothing: the nominal equations hold.
     Nominal,
-    /// Effects without states.
-    Stateless,
-    /// Effects with states that move, each a bit by its position among those of all effects.
-    Full(u64),
+    /// Effects, of whose states those move whose bits are set, by their positions among those of all effects.
+    Moving(u64),
+}
+
+impl Extent {
+    /// The states of effects that move.
+    fn moving(self) -> u64 {
+        match self {
+            Self::Nominal => 0,
+            Self::Moving(moving) => moving,
+        }
+    }
 }
 
 /// Inputs as the equations feel them over a passage: at its start, their slopes, and how long it lasts in s.
@@ -544,11 +500,12 @@ impl<S: System> Simulator<S> {
         let mut after = 0.0;
         while after < duration {
             let (felt, felt_slopes, span) = S::felt(memory, &coming, after);
-            let nominal_rates = |t: f64, y: &S::State, dy: &mut S::State| {
-                S::nominal_rates(parameters, &felt.along(&felt_slopes, t), y, dy);
-            };
             let rates = |t: f64, y: &S::State, dy: &mut S::State| {
-                S::rates(parameters, &felt.along(&felt_slopes, t), y, dy);
+                let inputs = felt.along(&felt_slopes, t);
+                match extent {
+                    Extent::Nominal => S::nominal_rates(parameters, &inputs, y, dy),
+                    Extent::Moving(_) => S::rates(parameters, &inputs, y, dy),
+                }
             };
             let start = time + after;
             let witness = |t0: f64, y0: &S::State, t1: f64, y1: &S::State, within: &dyn Fn(f64) -> S::State| {
@@ -558,13 +515,7 @@ impl<S: System> Simulator<S> {
                     see(S::outputs(parameters, clock, &inputs, &within(instant - after), memory));
                 }
             };
-            let passed = match extent {
-                Extent::Nominal => state.advance_own(nominal_rates, witness, &S::SCALE, tolerance, &mut step, span),
-                Extent::Stateless => state.advance_own(rates, witness, &S::SCALE, tolerance, &mut step, span),
-                Extent::Full(moving) => {
-                    state.advance_moving(moving, rates, witness, &S::SCALE, tolerance, &mut step, span)
-                }
-            };
+            let passed = state.advance(extent.moving(), rates, witness, &S::SCALE, tolerance, &mut step, span);
             passed.map_err(|failed| diverged::<S>(time + after, &failed))?;
             // On, even where a passage is shorter than rounding.
             after = if span < duration - after { (after + span).max(after.next_up()) } else { duration };
@@ -811,10 +762,10 @@ mod tests {
                 seen.push(within(0.5 * t1).0);
             };
             let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_all, t1, within);
-            all.advance(rates, witness, &scale, 1e-8, &mut step_of_all, 0.1).unwrap();
+            all.advance(u64::MAX >> 2, rates, witness, &scale, 1e-8, &mut step_of_all, 0.1).unwrap();
             let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_moving, t1, within);
             let moves = 1 << 2 | 1 << 11;
-            moving.advance_moving(moves, rates, witness, &scale, 1e-8, &mut step_of_moving, 0.1).unwrap();
+            moving.advance(moves, rates, witness, &scale, 1e-8, &mut step_of_moving, 0.1).unwrap();
         }
         assert_eq!((all, step_of_all, &instants[0]), (moving, step_of_moving, &instants[1]));
         assert!(all.0[13] != start.0[13] && all.0[12] == start.0[12] && !instants[0].is_empty());

@@ -98,11 +98,7 @@ crate::variables::signals! {
 /// What is at work of the effects.
 #[inline]
 fn extent(parameters: &Parameters) -> Extent {
-    match (parameters.are_nominal(), parameters.effects.moving()) {
-        (true, _) => Extent::Nominal,
-        (false, 0) => Extent::Stateless,
-        (false, moving) => Extent::Full(moving),
-    }
+    if parameters.are_nominal() { Extent::Nominal } else { Extent::Moving(parameters.effects.moving()) }
 }
 
 /// The point of the muscle itself behind that of its load, and its pull on the load in N; `own` are the states of the effects.
