@@ -37,9 +37,27 @@ impl<'a> Way<'a> {
 
     /// Looks for at most so many effects; `fitting` is told those of each fit. `None` where a model cannot be simulated.
     pub fn searched(self, most: usize, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
-        let mut search = Search::new(self.bench, self.baseline, self.allows_most, fitting);
-        let chosen = search.up_to(most)?;
-        Some(Found { search, chosen })
+        Found::in_full(self.looked_over(fitting), most)
+    }
+
+    /// The same beside what was found where the coefficients may be off in a way that allows less. Where that says all, and so does here the single
+    /// effect that looks best, but has not the odds, others are not looked for in full.
+    fn searched_beside(self, found: &Found<'a>, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
+        let mut search = self.looked_over(fitting);
+        if found.says_all()
+            && let Some(chosen) = search.of_best_single()
+        {
+            let best = Found { search, chosen };
+            if best.causes() == 1 && best.says_all() && found.beats(&best) {
+                return Some(best);
+            }
+            search = best.search;
+        }
+        Found::in_full(search, found.most_beside().min(AT_FIRST))
+    }
+
+    fn looked_over(self, fitting: &'a Fitting<'a>) -> Search<'a> {
+        Search::new(self.bench, self.baseline, self.allows_most, fitting)
     }
 }
 
@@ -61,7 +79,7 @@ pub fn better<'a>(
         return Ok(Some(found));
     }
     let wide = at_once.map_or_else(wide, Ok)?;
-    let Some(mut other) = wide.searched(found.most_beside().min(AT_FIRST), fitting) else { return Ok(None) };
+    let Some(mut other) = wide.searched_beside(&found, fitting) else { return Ok(None) };
     // Where another cause leads than was found, as many may be others.
     if other.leads_away_from(&found) {
         other.up_to(found.causes().min(AT_FIRST));
@@ -83,6 +101,13 @@ pub struct Found<'a> {
 }
 
 impl<'a> Found<'a> {
+    /// What comes of a search for at most so many effects; `None` where a model cannot be simulated.
+    fn in_full(mut search: Search<'a>, most: usize) -> Option<Self> {
+        search.refine();
+        let chosen = search.up_to(most)?;
+        Some(Self { search, chosen })
+    }
+
     /// The hypotheses' fits.
     pub fn bench(&self) -> &Bench<'a> {
         &self.search.bench

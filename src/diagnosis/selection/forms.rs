@@ -88,7 +88,7 @@ impl Search<'_> {
     }
 
     /// A hypothesis refined in all its effects and, where something is left then, further refined, and with one of them in another form.
-    fn in_best_form(&self, judged: Judged, best: Option<&Judged>) -> Judged {
+    pub(super) fn in_best_form(&self, judged: Judged, best: Option<&Judged>) -> Judged {
         let refined = self.finished_refined(judged.clone(), best, |judged| self.refined(judged));
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
             return refined;

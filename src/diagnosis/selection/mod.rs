@@ -118,9 +118,9 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search from a baseline, with single effects fitted; `fitting` is told the effects of each fit. Where another search lets the coefficients be
-    /// off in a way that allows more, what the form of a cause may leave is that one's to explain: else coefficients that are off come out as
-    /// a second cause.
+    /// A search from a baseline, with single effects fitted but not refined; `fitting` is told the effects of each fit. Where another search lets
+    /// the coefficients be off in a way that allows more, what the form of a cause may leave is that one's to explain: else coefficients that are
+    /// off come out as a second cause.
     pub fn new(bench: Bench<'a>, baseline: Fitted, minds_form: bool, fitting: &'a Fitting<'a>) -> Self {
         let mut search =
             Self { bench, fitting, baseline, minds_form, levels: Vec::new(), from: Vec::new(), unlisted: None };
@@ -130,10 +130,28 @@ impl<'a> Search<'a> {
         if singles.first().is_some_and(|best| best.evidence > LEAST_EVIDENCE) {
             singles = search.judged_anew(singles);
         }
-        let singles = if search.may_show() { search.refined_best(singles) } else { singles };
         search.unlisted = if search.is_sound(&search.baseline.losses) { None } else { search.best_unlisted() };
         search.levels = vec![singles];
         search
+    }
+
+    /// What is chosen of the single effects if only the best of them is refined.
+    pub fn of_best_single(&mut self) -> Option<Chosen> {
+        let mut singles = self.levels.first()?.clone();
+        let best = singles.first_mut()?;
+        *best = self.in_best_form(best.clone(), None);
+        let unrefined = std::mem::replace(&mut self.levels[0], sorted(singles));
+        let chosen = self.choose();
+        self.levels[0] = unrefined;
+        chosen
+    }
+
+    /// Refines the single effects.
+    pub fn refine(&mut self) {
+        if self.may_show() {
+            let singles = self.levels.swap_remove(0);
+            self.levels = vec![self.refined_best(singles)];
+        }
     }
 
     fn judge(&self, fitted: Fitted) -> Judged {
