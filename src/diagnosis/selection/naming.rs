@@ -28,49 +28,50 @@ const ALSO_BY_FORM: f64 = 3.0;
 /// quantile of χ² with one degree of freedom.
 const SPARED: f64 = 1.92;
 
+/// A hypothesis that is told.
+struct Told {
+    /// Number of parameters with which it can be.
+    size: usize,
+    /// Its fit, without refinements that may as well be neutral.
+    model: Fitted,
+    /// Whether the fit foretold samples that it did not see.
+    holds_out: bool,
+}
+
 impl Search<'_> {
     pub(super) fn choose(&self) -> Option<Chosen> {
-        let singles = self.levels.first()?;
-        let refused = |verdict, best: &Fitted| {
-            let model = self.bench.exact_fit(&self.baseline.hypothesis, &self.baseline.parameters, Scope::Training)?;
-            Some(Chosen {
-                verdict,
-                best: best.clone(),
-                without: self.baseline.losses.clone(),
-                model,
-                saw_all: false,
-                alternatives: Vec::new(),
-                rivals: Vec::new(),
-                singles: singles.clone(),
-            })
-        };
-        // What there is where nothing can be named: a cause in no library, if there is one that does better.
-        let else_there = |unlisted: Option<&Judged>| match unlisted {
-            Some(unlisted) => refused(Verdict::Unexplained, &unlisted.fitted),
-            None if self.is_sound(&self.baseline.losses) => refused(Verdict::Nominal, &self.baseline),
-            None => refused(Verdict::Unexplained, &self.baseline),
-        };
         let Some(best) = self.leading().map(|best| self.assured(self.pruned(best.clone()))) else {
-            return else_there(self.unlisted.as_ref());
+            return self.unnamed(self.unlisted.as_ref());
         };
-        let instead = self.unlisted_instead_of(&best);
-        if best.explained < least_explained(&best.fitted).0 || is_better_if_impossible(&self.levels, &best) {
-            return else_there(instead);
+        match self.as_told(&best) {
+            Some(told) => self.named(best, told),
+            None => self.unnamed(self.unlisted_instead_of(&best)),
         }
-        let plain = self.simplest(&best);
-        let size = plain.fitted.hypothesis.size();
-        let told = self.without_idle(plain.clone());
-        // As it is told, without refinements that only comparisons paid for, it must lose, too.
-        if instead.is_some() && self.unlisted_instead_of(&told).is_some() {
-            return else_there(instead);
-        }
-        let are_idle = told.fitted.hypothesis.size() < size;
-        let foretold = self.foretelling(told).or_else(|| if are_idle { self.foretelling(plain) } else { None });
-        let Some((model, holds_out)) = foretold else { return else_there(instead) };
-        let of_as_many = self.levels.iter().find(|level| effects_of(level) == best.fitted.hypothesis.parts.len());
-        let rivals = self.rivals(&best, size, of_as_many.map_or(&[], |level| level));
+    }
+
+    /// What there is where nothing can be named: a cause in no library, if there is one that does better.
+    fn unnamed(&self, unlisted: Option<&Judged>) -> Option<Chosen> {
+        let Fitted { hypothesis, parameters, losses, .. } = &self.baseline;
+        let is_nominal = unlisted.is_none() && self.is_sound(losses);
+        Some(Chosen {
+            verdict: if is_nominal { Verdict::Nominal } else { Verdict::Unexplained },
+            best: unlisted.map_or(&self.baseline, |unlisted| &unlisted.fitted).clone(),
+            without: losses.clone(),
+            model: self.bench.exact_fit(hypothesis, parameters, Scope::Training)?,
+            saw_all: false,
+            alternatives: Vec::new(),
+            rivals: Vec::new(),
+            singles: self.levels.first()?.clone(),
+        })
+    }
+
+    /// The best hypothesis with its rivals.
+    fn named(&self, best: Judged, told: Told) -> Option<Chosen> {
+        let parts = &best.fitted.hypothesis.parts;
+        let of_as_many = self.levels.iter().find(|level| effects_of(level) == parts.len());
+        let rivals = self.rivals(&best, told.size, of_as_many.map_or(&[], |level| level));
         let alternatives: Vec<Vec<&'static str>> =
-            best.fitted.hypothesis.parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
+            parts.iter().map(|part| in_place_of(part.effect.name, &best, &rivals)).collect();
         let verdict = if alternatives.iter().any(|a| !a.is_empty()) {
             Verdict::Ambiguous
         } else if self.is_sound(&best.fitted.losses) {
@@ -78,10 +79,33 @@ impl Search<'_> {
         } else {
             Verdict::PartlyExplained
         };
-        let rivals = rivals.into_iter().map(|rival| rival.fitted.clone()).collect();
-        let (best, without) = (best.fitted, self.baseline.losses.clone());
-        let singles = singles.clone();
-        Some(Chosen { verdict, model, best, without, saw_all: !holds_out, alternatives, rivals, singles })
+        Some(Chosen {
+            verdict,
+            rivals: rivals.into_iter().map(|rival| rival.fitted.clone()).collect(),
+            best: best.fitted,
+            without: self.baseline.losses.clone(),
+            model: told.model,
+            saw_all: !told.holds_out,
+            alternatives,
+            singles: self.levels.first()?.clone(),
+        })
+    }
+
+    /// A hypothesis as it is told; `None` where it is no name.
+    fn as_told(&self, best: &Judged) -> Option<Told> {
+        if best.explained < least_explained(&best.fitted).0 || is_better_if_impossible(&self.levels, best) {
+            return None;
+        }
+        let plain = self.simplest(best);
+        let size = plain.fitted.hypothesis.size();
+        let told = self.without_idle(plain.clone());
+        // As it is told, without refinements that only comparisons paid for, it must lose, too.
+        if [best, &told].into_iter().all(|judged| self.unlisted_instead_of(judged).is_some()) {
+            return None;
+        }
+        let are_idle = told.fitted.hypothesis.size() < size;
+        let foretold = self.foretelling(told).or_else(|| if are_idle { self.foretelling(plain) } else { None });
+        foretold.map(|(model, holds_out)| Told { size, model, holds_out })
     }
 
     /// Drops effects that a hypothesis of several can spare and be possible, the most superfluous first: fitted anew without it or, where
