@@ -40,22 +40,6 @@ impl<'a> Way<'a> {
         Found::in_full(self.looked_over(fitting), most)
     }
 
-    /// The same beside what was found where the coefficients may be off in a way that allows less. Where that says all, and so does here the single
-    /// effect that looks best, but has not the odds, others are not looked for in full.
-    fn searched_beside(self, found: &Found<'a>, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
-        let mut search = self.looked_over(fitting);
-        if found.says_all()
-            && let Some(chosen) = search.of_best_single()
-        {
-            let best = Found { search, chosen };
-            if best.causes() == 1 && best.says_all() && found.beats(&best) {
-                return Some(best);
-            }
-            search = best.search;
-        }
-        Found::in_full(search, found.most_beside().min(AT_FIRST))
-    }
-
     fn looked_over(self, fitting: &'a Fitting<'a>) -> Search<'a> {
         Search::new(self.bench, self.baseline, self.allows_most, fitting)
     }
@@ -74,14 +58,21 @@ pub fn better<'a>(
     let at_once = if narrow.says_all() { None } else { Some(wide()?) };
     // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
     let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
-    let Some(mut found) = narrow.searched(most.min(AT_FIRST), fitting) else { return Ok(None) };
+    let Some(mut found) = narrow.searched(1, fitting) else { return Ok(None) };
     if found.finds_nothing() {
         return Ok(Some(found));
     }
-    let wide = at_once.map_or_else(wide, Ok)?;
-    let Some(mut other) = wide.searched_beside(&found, fitting) else { return Ok(None) };
+    let mut beside = at_once.map_or_else(wide, Ok)?.looked_over(fitting);
+    match beside.single_that_says_all() {
+        // Where the one that looks best has not the odds, others are not looked for in full.
+        Some(best) if found.says_all() && found.beats(&beside.bench, &best) => return Ok(Some(found)),
+        // Against a single one that explains all there, several would hardly have the odds either.
+        Some(_) => {}
+        None => found.up_to(most.min(AT_FIRST)),
+    }
+    let Some(mut other) = Found::in_full(beside, found.most_beside().min(AT_FIRST)) else { return Ok(None) };
     // Where another cause leads than was found, as many may be others.
-    if other.leads_away_from(&found) {
+    if other.search.leads_away_from(&found.chosen.best.hypothesis) {
         other.up_to(found.causes().min(AT_FIRST));
     }
     // A third one takes minutes to find, and none is missing where two say all.
@@ -89,7 +80,7 @@ pub fn better<'a>(
         found.up_to(most);
         other.up_to(found.most_beside());
     }
-    Ok(Some(if found.beats(&other) { found } else { other }))
+    Ok(Some(if found.beats(other.bench(), &other.chosen.best) { found } else { other }))
 }
 
 /// What was found where the coefficients of the nominal model may be off in one way.
@@ -132,12 +123,6 @@ impl<'a> Found<'a> {
         self.causes() == 0 && self.says_all()
     }
 
-    /// Whether another effect than those that were found elsewhere does best alone.
-    fn leads_away_from(&self, other: &Self) -> bool {
-        let best = self.chosen.singles.first().map(|best| best.fitted.hypothesis.parts[0].effect.name);
-        best.is_some_and(|best| !other.chosen.best.hypothesis.has(best))
-    }
-
     /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
     /// than here, but a single one that may be another.
     pub fn most_beside(&self) -> usize {
@@ -148,22 +133,19 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// Whether causes are found here that are better than what was found where the coefficients may be off in a way that allows more. Each
+    /// Whether causes are found here that are better than the best fit where the coefficients may be off in a way that allows more. Each
     /// cause more must be worth it, and against coefficients alone they must show. A cause in no library must be worth it against one
     /// that has a name, and is none against coefficients that say all.
-    pub fn beats(&self, other: &Self) -> bool {
-        let more = self.causes() as f64 - other.causes() as f64;
-        let (may_be, stranger) = match other.causes() {
-            0 if self.is_unlisted() && other.says_all() => (false, 0.0),
+    fn beats(&self, wider: &Bench, best: &Fitted) -> bool {
+        let [own, others] = [&self.chosen.best, best].map(|fitted| &fitted.hypothesis);
+        let more = own.causes() as f64 - others.causes() as f64;
+        let [is_unlisted, other_is_unlisted] = [own, others].map(|hypothesis| hypothesis.beside.is_some());
+        let (may_be, stranger) = match others.causes() {
+            0 if is_unlisted && !is_unsound(&best.losses, &wider.data) => (false, 0.0),
             0 => (self.chosen.shows_beside_coefficients(&self.bench().data), 0.0),
-            _ => (true, f64::from(self.is_unlisted()) - f64::from(other.is_unlisted())),
+            _ => (true, f64::from(is_unlisted) - f64::from(other_is_unlisted)),
         };
-        self.causes() > 0 && may_be && self.odds_against(other) > LEAST_EVIDENCE * (more + stranger)
-    }
-
-    /// Whether what was found is a cause in no library.
-    fn is_unlisted(&self) -> bool {
-        self.chosen.best.hypothesis.beside.is_some()
+        own.causes() > 0 && may_be && self.odds_against(wider, best) > LEAST_EVIDENCE * (more + stranger)
     }
 
     /// How many causes were found, one in no library among them.
@@ -173,37 +155,36 @@ impl<'a> Found<'a> {
 
     /// Logarithm of the odds for the best fit here against that of another way, be it with the causes that both found in the forms that they
     /// have here: which form fits best hangs on how the coefficients may be off.
-    fn odds_against(&self, other: &Self) -> f64 {
-        let in_these_forms = other.in_forms_of(self);
-        let each = [Some(&other.chosen.best), in_these_forms.as_ref()];
-        each.into_iter().flatten().map(|fit| self.odds_against_fit(other, fit)).fold(f64::INFINITY, f64::min)
-    }
-
-    /// The best fit with the causes that were found elsewhere, too, in the forms that they have there; `None` where none was, or where they
-    /// cannot be so.
-    fn in_forms_of(&self, other: &Self) -> Option<Fitted> {
-        let [own, others] = [&self.chosen.best, &other.chosen.best];
-        let shared = others.hypothesis.parts.iter().copied().filter(|part| own.hypothesis.has(part.effect.name));
-        let shared = Hypothesis { parts: shared.collect(), beside: None };
-        if shared.parts.is_empty() || own.hypothesis.names() == others.hypothesis.names() {
-            return None;
-        }
-        let hypothesis = shared.parts.iter().fold(own.hypothesis.clone(), |all, part| all.in_form_of(*part));
-        let without = shared.parts.iter().fold(own.parameters, |model, part| neutralised(&model, part.effect));
-        let start = shared.at_work_in(&without, &others.parameters);
-        self.bench().exact_fit(&hypothesis, &start, Scope::All).filter(Fitted::is_possible)
+    fn odds_against(&self, wider: &Bench, best: &Fitted) -> f64 {
+        let in_these_forms = in_forms_of(wider, best, &self.chosen.best);
+        let each = [Some(best), in_these_forms.as_ref()];
+        each.into_iter().flatten().map(|fit| self.odds_against_fit(wider, fit)).fold(f64::INFINITY, f64::min)
     }
 
     /// The odds against one fit of the other way; the likelihoods are those of the other one's data.
-    fn odds_against_fit(&self, other: &Self, others: &Fitted) -> f64 {
+    fn odds_against_fit(&self, wider: &Bench, others: &Fitted) -> f64 {
         let own = &self.chosen.best;
-        let losses = |fitted: &Fitted| other.bench().data.losses(&fitted.residuals, Scope::All);
+        let losses = |fitted: &Fitted| wider.data.losses(&fitted.residuals, Scope::All);
         let (mut with, without) = (losses(own), losses(others));
         // The whiter residuals say how much a sample is worth, but no shape of a sound muscle is worth more than once in a block.
         for (a, b) in with.iter_mut().zip(&without) {
             a.effective = a.effective.max(b.effective).min(a.effective_beside_structure);
         }
         let more = own.hypothesis.size() as f64 - others.hypothesis.size() as f64;
-        odds(&without, &with, more) - self.bench().price(own) + other.bench().price(others)
+        odds(&without, &with, more) - self.bench().price(own) + wider.price(others)
     }
+}
+
+/// A fit with the causes that were found elsewhere, too, in the forms that they have there; `None` where none was, or where they cannot
+/// be so.
+fn in_forms_of(bench: &Bench, own: &Fitted, elsewhere: &Fitted) -> Option<Fitted> {
+    let shared = elsewhere.hypothesis.parts.iter().copied().filter(|part| own.hypothesis.has(part.effect.name));
+    let shared = Hypothesis { parts: shared.collect(), beside: None };
+    if shared.parts.is_empty() || own.hypothesis.names() == elsewhere.hypothesis.names() {
+        return None;
+    }
+    let hypothesis = shared.parts.iter().fold(own.hypothesis.clone(), |all, part| all.in_form_of(*part));
+    let without = shared.parts.iter().fold(own.parameters, |model, part| neutralised(&model, part.effect));
+    let start = shared.at_work_in(&without, &elsewhere.parameters);
+    bench.exact_fit(&hypothesis, &start, Scope::All).filter(Fitted::is_possible)
 }

@@ -8,7 +8,7 @@ mod naming;
 use super::Fitting;
 use super::Verdict;
 use super::fits::{Bench, Fitted, Slopes, Start};
-use super::hypothesis::{Part, has_many_minima, neutralised};
+use super::hypothesis::{Hypothesis, Part, has_many_minima, neutralised};
 use super::residuals::{Data, Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
@@ -135,22 +135,32 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// What is chosen of the single effects if only the best of them is refined.
-    pub fn of_best_single(&mut self) -> Option<Chosen> {
+    /// The single effect that leads if only the one that looks best is refined, where it leaves no more than a sound model may.
+    pub fn single_that_says_all(&mut self) -> Option<Fitted> {
         let mut singles = self.levels.first()?.clone();
         let best = singles.first_mut()?;
         *best = self.in_best_form(best.clone(), None);
         let unrefined = std::mem::replace(&mut self.levels[0], sorted(singles));
-        let chosen = self.choose();
+        let leading = self.leading().map(|best| best.fitted.clone());
         self.levels[0] = unrefined;
-        chosen
+        leading.filter(|leading| !is_unsound(&leading.losses, &self.bench.data))
     }
 
     /// Refines the single effects.
     pub fn refine(&mut self) {
         if self.may_show() {
-            let singles = self.levels.swap_remove(0);
-            self.levels = vec![self.refined_best(singles)];
+            let singles = std::mem::take(&mut self.levels[0]);
+            self.levels[0] = self.refined_best(singles);
+        }
+    }
+
+    /// Whether another effect than those that were found elsewhere does best alone, by what an effect must have.
+    pub fn leads_away_from(&self, found: &Hypothesis) -> bool {
+        let is_found = |single: &&Judged| found.has(single.fitted.hypothesis.parts[0].effect.name);
+        let singles = self.levels.first().map_or(&[][..], |singles| singles);
+        match (singles.first(), singles.iter().find(is_found)) {
+            (Some(best), Some(other)) => evidence(&other.fitted, &best.fitted) > LEAST_EVIDENCE,
+            (best, _) => best.is_some(),
         }
     }
 
