@@ -50,6 +50,8 @@ pub mod plot;
 #[cfg(feature = "tool")]
 pub mod quality;
 #[cfg(feature = "tool")]
+mod recent;
+#[cfg(feature = "tool")]
 pub mod reproduction;
 #[cfg(feature = "tool")]
 pub mod simulation;

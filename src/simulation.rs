@@ -1,6 +1,7 @@
 //! Models over time: the replay of a recording, and the closed loop.
 
 use crate::controller::PidFeedForward;
+use crate::effects::{Effects, Readings};
 use crate::integrator::TOLERANCE;
 use crate::measurement::{Recording, Signal};
 use crate::model::{Simulator, System};
@@ -10,6 +11,7 @@ use crate::plant::{
     PneumaticMuscle, masses, resting_pressure, steady_pressure,
 };
 use crate::quality::sensors::resolution;
+use crate::recent::Recent;
 use crate::reference::ReferenceTrajectory;
 use crate::variables::Signals;
 use crate::{Error, GRAVITY, Result};
@@ -44,6 +46,21 @@ impl Replay {
         self.contraction.push(contraction);
         self.force.push(force);
     }
+
+    /// What it is with further sensors behind, at the given times.
+    fn seen_by(mut self, sensors: &Effects, time: &[f64]) -> Self {
+        if sensors.are_neutral() {
+            return self;
+        }
+        let readings = self.gauge_pressure.iter_mut().zip(&mut self.contraction).zip(&mut self.force);
+        for (((gauge_pressure, contraction), force), now) in readings.zip(time) {
+            let time = now - time[0];
+            let truth = Readings { time, contraction: *contraction, gauge_pressure: *gauge_pressure, force: *force };
+            let shown = sensors.readings(truth);
+            (*gauge_pressure, *contraction, *force) = (shown.gauge_pressure, shown.contraction, shown.force);
+        }
+        self
+    }
 }
 
 /// Samples whose mean is taken as the pressure at the start where it moves; and longest time in s over which it is judged where it
@@ -76,7 +93,21 @@ pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> 
 /// # Errors
 /// As [`replay`].
 pub fn replay_within(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
-    replay_chain(parameters, recording, tolerance).map_err(|error| in_file(recording, error))
+    replay_remembering(parameters, recording, tolerance, &Recent::new(0))
+}
+
+/// The same where it is known how a load moved with the models that were simulated last in this recording, to the same tolerance: not what
+/// sensors showed of it.
+///
+/// # Errors
+/// As [`replay`].
+pub(crate) fn replay_remembering(
+    parameters: &Parameters,
+    recording: &Recording,
+    tolerance: f64,
+    known: &Recent<Replay>,
+) -> Result<Replay> {
+    replay_chain(parameters, recording, tolerance, known).map_err(|error| in_file(recording, error))
 }
 
 /// An error with the recording that it is one of.
@@ -84,7 +115,12 @@ fn in_file(recording: &Recording, error: Error) -> Error {
     Error::Replay { path: recording.path.clone(), problem: Box::new(error) }
 }
 
-fn replay_chain(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
+fn replay_chain(
+    parameters: &Parameters,
+    recording: &Recording,
+    tolerance: f64,
+    known: &Recent<Replay>,
+) -> Result<Replay> {
     let mut parameters = in_recording(parameters, recording);
     let Some(command) = recording.bridged(Signal::Command) else {
         return replay_pull(&parameters, recording, tolerance);
@@ -95,7 +131,10 @@ fn replay_chain(parameters: &Parameters, recording: &Recording, tolerance: f64) 
         parameters.load.mass = mass;
         let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
-        return follow::<PneumaticMuscle>(&parameters, time, tolerance, inputs, shown, None, &[]);
+        let [plant, sensors] = parameters.effects.apart();
+        let plant = Parameters { effects: plant, ..parameters };
+        let follow = || follow::<PneumaticMuscle>(&plant, time, tolerance, inputs, shown, None, &[]);
+        return Ok(known.get_or(&plant, follow)?.seen_by(&sensors, time));
     }
     let motion = Motion::of(&parameters, recording);
     let inputs = |k: usize, pull: f64| ActuatorInputs {
@@ -480,6 +519,7 @@ pub fn closed_loop_on(plant: &Parameters, known: &Parameters, step: f64, duratio
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Description;
 
     const PERIOD: f64 = 0.01;
 
@@ -504,5 +544,43 @@ mod tests {
         assert_eq!(rests(60, |time| 2e5 + 2e4 * (-time / 0.064).exp()), START_SAMPLES, "the pressure still moves");
         assert_eq!(rests(120, |time| 2e5 + 2e5 * (-time / 0.025).exp()), START_SAMPLES, "the pressure still moves");
         assert_eq!(rests(25, |time| 2e5 + 1e5 * time), START_SAMPLES, "the pressure still moves");
+    }
+
+    #[test]
+    fn sensors_behind_a_course_show_what_they_show_within_it() {
+        let mut parameters = Parameters::default();
+        let of_sensors = Effects::DESCRIPTIONS.iter().filter(|effect| effect.name.contains("_sensor_"));
+        let sensors: Vec<_> = of_sensors.flat_map(|effect| effect.typical().chain(refined(effect))).collect();
+        let others = [
+            ("temperature_drift.force_zero", 20.0),
+            ("temperature_drift.pressure_zero", 5e3),
+            ("series_elasticity.compliance", 5e-6),
+        ];
+        assert!(sensors.len() > 14, "{sensors:?}");
+        for (name, value) in sensors.into_iter().chain(others) {
+            parameters.set(name, value).unwrap();
+        }
+        let [plant, sensors] = parameters.effects.apart();
+        assert_ne!(plant, parameters.effects);
+        let (time, command) = ((0..300).map(|k| PERIOD * f64::from(k)).collect::<Vec<_>>(), command(60));
+        let followed = |effects: Effects| {
+            let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
+            let shown =
+                |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
+            let parameters = Parameters { effects, ..parameters };
+            follow::<PneumaticMuscle>(&parameters, &time, TOLERANCE, inputs, shown, None, &[]).unwrap()
+        };
+        let (within, behind) = (followed(parameters.effects), followed(plant).seen_by(&sensors, &time));
+        for (signal, close) in [(Signal::GaugePressure, 1e-3), (Signal::Contraction, 1e-9), (Signal::Force, 1e-5)] {
+            let [within, behind] = [&within, &behind].map(|replay| replay.get(signal).unwrap());
+            for (within, behind) in within.iter().zip(behind) {
+                assert!((within - behind).abs() < close, "{signal:?} {within} {behind}");
+            }
+        }
+    }
+
+    /// Refinements where fits start with them.
+    fn refined(effect: &Description) -> impl Iterator<Item = (&'static str, f64)> {
+        effect.refinements.iter().map(|(name, starts)| (*name, starts[0]))
     }
 }

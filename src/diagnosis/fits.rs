@@ -9,11 +9,10 @@ use super::unlisted::Unlisted;
 use crate::effects::{Description, Freed};
 use crate::least_squares::{self, Effort, Ended, Free, derivatives, linear_decrease, normal_matrix};
 use crate::parameters::Parameters;
+use crate::recent::Recent;
 use crate::variables::Variable;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::collections::VecDeque;
-use std::sync::{Mutex, PoisonError};
 
 /// Of a fit that only has to show what a hypothesis is worth.
 const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
@@ -97,6 +96,9 @@ impl Slopes {
     }
 }
 
+/// What nominal models with some effects beside change of the residuals.
+pub type Changes = Recent<Vec<f64>>;
+
 /// What fits of all hypotheses have in common.
 pub struct Bench<'a> {
     /// The recordings.
@@ -108,22 +110,24 @@ pub struct Bench<'a> {
     slopes: Slopes,
     weights: Vec<f64>,
     /// Models that were simulated last, with what [`Data::residuals`] gives for them.
-    recent: Mutex<VecDeque<(Parameters, Vec<f64>)>>,
+    recent: Recent<Vec<f64>>,
+    /// What effects change of the baseline's residuals, in whatever way its coefficients are off.
+    changes: &'a Changes,
 }
 
 impl<'a> Bench<'a> {
     /// Prepares fits of a nominal model that is good to `tolerance`.
-    pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64, off: Off) -> Self {
+    pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64, off: Off, changes: &'a Changes) -> Self {
         let corrections = corrections(nominal, tolerance, off);
         let weights = data.weights(Scope::All);
-        Self { data, nominal, corrections, slopes: Slopes::default(), weights, recent: Mutex::default() }
+        Self { data, nominal, corrections, slopes: Slopes::default(), weights, recent: Recent::new(KEPT), changes }
     }
 
     /// Takes what a better model shows of the noise.
     pub fn refine_noise(&mut self, residuals: &[f64]) {
         self.data.refine_noise(residuals);
         self.weights = self.data.weights(Scope::All);
-        self.recent = Mutex::default(); // the start is in doubt as the noise has it
+        self.recent = Recent::new(KEPT); // the start is in doubt as the noise has it
     }
 
     /// A fit with its residuals as the noise that is known now has them; `None` where it cannot be simulated.
@@ -134,16 +138,7 @@ impl<'a> Bench<'a> {
 
     /// [`Data::residuals`] of a model. A fit starts from where another one did or ended: one simulation in eight is known.
     fn residuals(&self, model: &Parameters) -> Option<Vec<f64>> {
-        let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = recent().iter().find(|(known, _)| known == model).map(|(_, residuals)| residuals.clone());
-        if known.is_some() {
-            return known;
-        }
-        let residuals = self.data.residuals(model)?;
-        let mut recent = recent();
-        recent.truncate(KEPT - 1);
-        recent.push_front((*model, residuals.clone()));
-        Some(residuals)
+        self.recent.get_or(model, || self.data.residuals(model).ok_or(())).ok()
     }
 
     /// Fits the corrections alone, and learns what each of them does to the residuals.
@@ -427,11 +422,7 @@ impl<'a> Bench<'a> {
     /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.
     pub fn start(&self, base: &Fitted, part: Part, choice: usize) -> Option<Start> {
         let parameters = at_start(&base.parameters, part.freed(), choice);
-        let change = |model: &Parameters| {
-            let changed = self.residuals(model)?;
-            let change = changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect::<Vec<_>>();
-            Some(weighted(&change, &self.weights))
-        };
+        let change = |model: &Parameters| Some(weighted(&self.change(base, model)?, &self.weights));
         let mut whole = change(&parameters)?;
         if part.has_many_minima() {
             forgive(&mut whole, &weighted(&base.residuals, &self.weights), self.data.blocks());
@@ -448,6 +439,21 @@ impl<'a> Bench<'a> {
         let in_others = without.filter_map(|model| change(&model));
         let promise = self.promise(base, [whole].into_iter().chain(in_others).collect());
         Some(Start { promise, part, choice, parameters })
+    }
+
+    /// By how much the residuals of a model differ from those of a fit. Effects alone do the same where the coefficients of the nominal model are
+    /// off in another way, to first order.
+    fn change(&self, base: &Fitted, model: &Parameters) -> Option<Vec<f64>> {
+        let change = || {
+            let changed = self.residuals(model)?;
+            Some(changed.iter().zip(&base.residuals).map(|(after, before)| after - before).collect())
+        };
+        if base.hypothesis.parts.is_empty() {
+            let effects = Parameters { effects: model.effects, ..*self.nominal };
+            self.changes.get_or(&effects, || change().ok_or(())).ok()
+        } else {
+            change()
+        }
     }
 
     /// A start with the best size nearby, where the error has many minima over it.

@@ -29,7 +29,7 @@ use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality;
 use crate::variables::Declared;
-use fits::{Bench, Fitted};
+use fits::{Bench, Changes, Fitted};
 use hypothesis::{Off, Part, recording_of};
 use residuals::{Data, Scope};
 use selection::{Chosen, Judged, MOST_EFFECTS};
@@ -164,11 +164,13 @@ pub fn diagnose(
     let cannot_follow = || residuals::cannot_follow(recordings);
     let data = Data::new(recordings, nominal, tolerance)?; // a model that cannot be simulated at all is the user's to mend
     let thinned = thinned(recordings);
+    let changes = Changes::new(usize::MAX);
     let prepared = |off: &Off| {
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;
         for_fits.doubt_starts(nominal);
-        Way::new(Bench::new(for_fits, nominal, tolerance, *off), *off == Off::most(nominal)).ok_or_else(cannot_follow)
+        let bench = Bench::new(for_fits, nominal, tolerance, *off, &changes);
+        Way::new(bench, *off == Off::most(nominal)).ok_or_else(cannot_follow)
     };
     let found = match Off::ways(nominal) {
         [narrow, wide] => ways::better(prepared(narrow)?, || prepared(wide), fitting)?,

@@ -6,7 +6,8 @@ use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality::correlation;
 use crate::quality::sensors::resolution;
-use crate::simulation::{OUTPUTS, Replay, in_recording, replay, replay_within, start_deviation};
+use crate::recent::Recent;
+use crate::simulation::{OUTPUTS, Replay, in_recording, replay, replay_remembering, replay_within, start_deviation};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -26,6 +27,8 @@ const STRUCTURE_SHARE: f64 = 0.02;
 const BLOCK: f64 = 2.0;
 /// A course with more of its variance than this in common with what drives the muscle may come from there.
 const MOST_OF_VARIANCE: f64 = 0.5;
+/// Courses of a load that are kept of each recording: fits of what sensors show change little else.
+const KEPT_COURSES: usize = 16;
 /// No sensor is better than this share of what it shows: data without any noise are simulated.
 const FINEST: f64 = 1e-5;
 
@@ -55,6 +58,8 @@ pub struct Data<'a> {
     pub tolerance: f64,
     /// Tolerance of the integration, see [`integrator::advance`].
     pub integration: f64,
+    /// Per recording, how a load moved there with the models that were simulated last.
+    courses: Vec<Recent<Replay>>,
 }
 
 /// How large the residuals of one signal in one recording are.
@@ -143,6 +148,7 @@ impl<'a> Data<'a> {
             by_start: Vec::new(),
             tolerance,
             integration: integrator::TOLERANCE,
+            courses: recordings.iter().map(|_| Recent::new(KEPT_COURSES)).collect(),
         };
         let judged: Vec<Signal> = data.signals().into_iter().filter(|signal| data.is_judged(*signal)).collect();
         data.segments.retain(|segment| judged.contains(&segment.signal));
@@ -246,7 +252,7 @@ impl<'a> Data<'a> {
     /// Measured − simulated in SI, signal by signal and recording by recording; `None` where the model cannot be
     /// simulated. What the pressure at the start does to them counts less, the more it is in doubt.
     pub fn residuals(&self, parameters: &Parameters) -> Option<Vec<f64>> {
-        let mut residuals = self.residuals_on(self.recordings, 1, parameters)?;
+        let mut residuals = self.residuals_of(&self.replays(parameters)?, 1)?;
         self.whiten_all(&mut residuals);
         Some(residuals)
     }
@@ -317,15 +323,21 @@ impl<'a> Data<'a> {
         self.segments.last().map_or(0, |segment| segment.range.end)
     }
 
-    /// Simulations of a model on recordings; `None` where one cannot be done.
-    pub fn replays(&self, recordings: &[Recording], parameters: &Parameters) -> Option<Vec<Replay>> {
-        let replayed = |recording| replay_within(parameters, recording, self.integration).ok();
-        recordings.par_iter().map(replayed).collect()
+    /// Simulations of a model, one per recording; `None` where one cannot be done.
+    pub fn replays(&self, parameters: &Parameters) -> Option<Vec<Replay>> {
+        let known = self.recordings.par_iter().zip(&self.courses);
+        let replayed = |(recording, known)| replay_remembering(parameters, recording, self.integration, known).ok();
+        known.map(replayed).collect()
     }
 
     /// Residuals of simulations on recordings whose `every`-th samples are those of this data.
     fn residuals_on(&self, recordings: &[Recording], every: usize, parameters: &Parameters) -> Option<Vec<f64>> {
-        let replays = self.replays(recordings, parameters)?;
+        let replayed = |recording| replay_within(parameters, recording, self.integration).ok();
+        self.residuals_of(&recordings.par_iter().map(replayed).collect::<Option<Vec<_>>>()?, every)
+    }
+
+    /// The same of simulations that were done.
+    fn residuals_of(&self, replays: &[Replay], every: usize) -> Option<Vec<f64>> {
         let mut all = Vec::with_capacity(self.count());
         for segment in &self.segments {
             let (measured, simulated) = (self.measured(segment), replays[segment.recording].get(segment.signal)?);

@@ -155,7 +155,7 @@ pub struct Shown<'d> {
 impl<'d> Shown<'d> {
     /// `None` where the model cannot be simulated.
     pub fn beside(data: &'d Data<'d>, model: &Parameters) -> Option<Self> {
-        Some(Self { data, simulated: data.replays(data.recordings(), model)? })
+        Some(Self { data, simulated: data.replays(model)? })
     }
 
     /// What a cause of size one adds to the readings, one value per residual; `None` where it cannot show.

@@ -4,9 +4,9 @@
 use super::Fitting;
 use super::fits::{Bench, Fitted};
 use super::hypothesis::{Hypothesis, neutralised};
-use super::residuals::Scope;
-use super::selection::evidence::{is_unsound, odds};
-use super::selection::{Chosen, LEAST_EVIDENCE, MOST_EFFECTS, Search};
+use super::residuals::{Data, Scope};
+use super::selection::evidence::{is_unsound, may_be_form, odds, takes_off};
+use super::selection::{Chosen, LEAST_BESIDE_OTHERS, LEAST_EVIDENCE, MOST_EFFECTS, Search};
 use crate::Result;
 
 /// Effects that are looked for in both ways before more are in either.
@@ -37,7 +37,7 @@ impl<'a> Way<'a> {
 
     /// Looks for at most so many effects; `fitting` is told those of each fit. `None` where a model cannot be simulated.
     pub fn searched(self, most: usize, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
-        Found::in_full(self.looked_over(fitting), most)
+        Found::of(self.looked_over(fitting), most)
     }
 
     fn looked_over(self, fitting: &'a Fitting<'a>) -> Search<'a> {
@@ -58,29 +58,41 @@ pub fn better<'a>(
     let at_once = if narrow.says_all() { None } else { Some(wide()?) };
     // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
     let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
-    let Some(mut found) = narrow.searched(1, fitting) else { return Ok(None) };
-    if found.finds_nothing() {
-        return Ok(Some(found));
+    let mut narrow = narrow.looked_over(fitting);
+    if at_once.is_none() {
+        let Some(found) = Found::of(narrow, 1) else { return Ok(None) };
+        if found.finds_nothing() {
+            return Ok(Some(found));
+        }
+        narrow = found.search;
     }
-    let mut beside = at_once.map_or_else(wide, Ok)?.looked_over(fitting);
-    match beside.single_that_says_all() {
-        // Where the one that looks best has not the odds, others are not looked for in full.
-        Some(best) if found.says_all() && found.beats(&beside.bench, &best) => return Ok(Some(found)),
-        // Against a single one that explains all there, several would hardly have the odds either.
-        Some(_) => {}
-        None => found.up_to(most.min(AT_FIRST)),
+    let mut wide = at_once.map_or_else(wide, Ok)?.looked_over(fitting);
+    if let Some(wins) = wins_alone(&mut narrow, &mut wide) {
+        let winner = if wins { &mut narrow } else { &mut wide };
+        if let Some(chosen) = winner.up_to(1).filter(Chosen::names_causes) {
+            return Ok(Some(Found { search: if wins { narrow } else { wide }, chosen }));
+        }
     }
-    let Some(mut other) = Found::in_full(beside, found.most_beside().min(AT_FIRST)) else { return Ok(None) };
+    let Some(mut found) = Found::of(narrow, most.min(AT_FIRST)) else { return Ok(None) };
+    let Some(mut other) = Found::of(wide, found.most_beside().min(AT_FIRST)) else { return Ok(None) };
     // Where another cause leads than was found, as many may be others.
     if other.search.leads_away_from(&found.chosen.best.hypothesis) {
-        other.up_to(found.causes().min(AT_FIRST));
+        other.up_to(found.best().causes().min(AT_FIRST));
     }
     // A third one takes minutes to find, and none is missing where two say all.
-    if !other.says_all() {
+    if !other.best().says_all() {
         found.up_to(most);
         other.up_to(found.most_beside());
     }
-    Ok(Some(if found.beats(other.bench(), &other.chosen.best) { found } else { other }))
+    Ok(Some(if found.best().beats(&other.best()) { found } else { other }))
+}
+
+/// Whether the single effect that looks best beats the one of a way that allows more, where that one leaves nothing; `None` where it does not.
+/// Then several effects would hardly have the odds, and others alone need only be looked for in full where the better one was found.
+fn wins_alone(narrow: &mut Search, wide: &mut Search) -> Option<bool> {
+    let (own, other) = (narrow.best_single()?, wide.best_single()?);
+    let [own, other] = [(&*narrow, &own), (&*wide, &other)].map(|(search, fitted)| Best { search, fitted });
+    other.says_all().then(|| own.beats(&other))
 }
 
 /// What was found where the coefficients of the nominal model may be off in one way.
@@ -93,8 +105,7 @@ pub struct Found<'a> {
 
 impl<'a> Found<'a> {
     /// What comes of a search for at most so many effects; `None` where a model cannot be simulated.
-    fn in_full(mut search: Search<'a>, most: usize) -> Option<Self> {
-        search.refine();
+    fn of(mut search: Search<'a>, most: usize) -> Option<Self> {
         let chosen = search.up_to(most)?;
         Some(Self { search, chosen })
     }
@@ -102,6 +113,26 @@ impl<'a> Found<'a> {
     /// The hypotheses' fits.
     pub fn bench(&self) -> &Bench<'a> {
         &self.search.bench
+    }
+
+    /// Its best fit to all samples.
+    fn best(&self) -> Best<'_, 'a> {
+        Best { search: &self.search, fitted: &self.chosen.best }
+    }
+
+    /// Whether nothing is wrong, so that nothing can be where the coefficients may be off in a way that allows more.
+    fn finds_nothing(&self) -> bool {
+        self.best().causes() == 0 && self.best().says_all()
+    }
+
+    /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
+    /// than here, but a single one that may be another.
+    fn most_beside(&self) -> usize {
+        match self.best().causes() {
+            0 => MOST_EFFECTS,
+            _ if !self.best().says_all() => MOST_EFFECTS,
+            causes => (causes - 1).max(1),
+        }
     }
 
     /// Looks for more effects, at most so many, where that is worth it.
@@ -112,79 +143,89 @@ impl<'a> Found<'a> {
             self.chosen = chosen;
         }
     }
+}
+
+/// The best fit of a search.
+struct Best<'s, 'a> {
+    search: &'s Search<'a>,
+    fitted: &'s Fitted,
+}
+
+impl Best<'_, '_> {
+    fn data(&self) -> &Data<'_> {
+        &self.search.bench.data
+    }
+
+    /// How many causes it has, one in no library among them.
+    fn causes(&self) -> usize {
+        self.fitted.hypothesis.causes()
+    }
+
+    /// Whether it has a cause in no library.
+    fn is_unlisted(&self) -> bool {
+        self.fitted.hypothesis.beside.is_some()
+    }
 
     /// Whether no more is left than a sound model may leave and, of several causes, their forms.
     fn says_all(&self) -> bool {
-        self.chosen.says_all(&self.bench().data)
-    }
-
-    /// Whether nothing is wrong, so that nothing can be where the coefficients may be off in a way that allows more.
-    pub fn finds_nothing(&self) -> bool {
-        self.causes() == 0 && self.says_all()
-    }
-
-    /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
-    /// than here, but a single one that may be another.
-    pub fn most_beside(&self) -> usize {
         match self.causes() {
-            0 => MOST_EFFECTS,
-            _ if !self.says_all() => MOST_EFFECTS,
-            causes => (causes - 1).max(1),
+            0 | 1 => !is_unsound(&self.fitted.losses, self.data()),
+            _ => may_be_form(&self.search.baseline.losses, &self.fitted.losses, self.data()),
         }
     }
 
-    /// Whether causes are found here that are better than the best fit where the coefficients may be off in a way that allows more. Each
-    /// cause more must be worth it, and against coefficients alone they must show. A cause in no library must be worth it against one
-    /// that has a name, and is none against coefficients that say all.
-    fn beats(&self, wider: &Bench, best: &Fitted) -> bool {
-        let [own, others] = [&self.chosen.best, best].map(|fitted| &fitted.hypothesis);
-        let more = own.causes() as f64 - others.causes() as f64;
-        let [is_unlisted, other_is_unlisted] = [own, others].map(|hypothesis| hypothesis.beside.is_some());
-        let (may_be, stranger) = match others.causes() {
-            0 if is_unlisted && !is_unsound(&best.losses, &wider.data) => (false, 0.0),
-            0 => (self.chosen.shows_beside_coefficients(&self.bench().data), 0.0),
-            _ => (true, f64::from(is_unlisted) - f64::from(other_is_unlisted)),
+    /// Whether its causes are better than what was found where the coefficients may be off in a way that allows more. Each cause more must be
+    /// worth it, and against coefficients alone they must take off so much that these need not be what they stand for. A cause in no library
+    /// must be worth it against one that has a name, and is none against coefficients that say all.
+    fn beats(&self, other: &Self) -> bool {
+        let more = self.causes() as f64 - other.causes() as f64;
+        let (may_be, stranger) = match other.causes() {
+            0 if self.is_unlisted() && other.says_all() => (false, 0.0),
+            0 => {
+                let without = &self.search.baseline.losses;
+                (takes_off(without, &self.fitted.losses, self.data(), LEAST_BESIDE_OTHERS), 0.0)
+            }
+            _ => (true, f64::from(self.is_unlisted()) - f64::from(other.is_unlisted())),
         };
-        own.causes() > 0 && may_be && self.odds_against(wider, best) > LEAST_EVIDENCE * (more + stranger)
+        self.causes() > 0 && may_be && self.odds_against(other) > LEAST_EVIDENCE * (more + stranger)
     }
 
-    /// How many causes were found, one in no library among them.
-    fn causes(&self) -> usize {
-        self.chosen.best.hypothesis.causes()
+    /// Logarithm of the odds against that of another way, be it with the causes that both found in the forms that they have here: which form
+    /// fits best hangs on how the coefficients may be off.
+    fn odds_against(&self, other: &Self) -> f64 {
+        let in_these_forms = other.in_forms_of(self);
+        let each = [Some(other.fitted), in_these_forms.as_ref()];
+        each.into_iter()
+            .flatten()
+            .map(|fitted| self.odds_against_fit(&Best { fitted, ..*other }))
+            .fold(f64::INFINITY, f64::min)
     }
 
-    /// Logarithm of the odds for the best fit here against that of another way, be it with the causes that both found in the forms that they
-    /// have here: which form fits best hangs on how the coefficients may be off.
-    fn odds_against(&self, wider: &Bench, best: &Fitted) -> f64 {
-        let in_these_forms = in_forms_of(wider, best, &self.chosen.best);
-        let each = [Some(best), in_these_forms.as_ref()];
-        each.into_iter().flatten().map(|fit| self.odds_against_fit(wider, fit)).fold(f64::INFINITY, f64::min)
+    /// The best fit with the causes that were found elsewhere, too, in the forms that they have there; `None` where none was, or where they
+    /// cannot be so.
+    fn in_forms_of(&self, other: &Self) -> Option<Fitted> {
+        let [own, others] = [self.fitted, other.fitted];
+        let shared = others.hypothesis.parts.iter().copied().filter(|part| own.hypothesis.has(part.effect.name));
+        let shared = Hypothesis { parts: shared.collect(), beside: None };
+        if shared.parts.is_empty() || own.hypothesis.names() == others.hypothesis.names() {
+            return None;
+        }
+        let hypothesis = shared.parts.iter().fold(own.hypothesis.clone(), |all, part| all.in_form_of(*part));
+        let without = shared.parts.iter().fold(own.parameters, |model, part| neutralised(&model, part.effect));
+        let start = shared.at_work_in(&without, &others.parameters);
+        self.search.bench.exact_fit(&hypothesis, &start, Scope::All).filter(Fitted::is_possible)
     }
 
     /// The odds against one fit of the other way; the likelihoods are those of the other one's data.
-    fn odds_against_fit(&self, wider: &Bench, others: &Fitted) -> f64 {
-        let own = &self.chosen.best;
-        let losses = |fitted: &Fitted| wider.data.losses(&fitted.residuals, Scope::All);
-        let (mut with, without) = (losses(own), losses(others));
+    fn odds_against_fit(&self, other: &Self) -> f64 {
+        let losses = |fitted: &Fitted| other.data().losses(&fitted.residuals, Scope::All);
+        let (mut with, without) = (losses(self.fitted), losses(other.fitted));
         // The whiter residuals say how much a sample is worth, but no shape of a sound muscle is worth more than once in a block.
         for (a, b) in with.iter_mut().zip(&without) {
             a.effective = a.effective.max(b.effective).min(a.effective_beside_structure);
         }
-        let more = own.hypothesis.size() as f64 - others.hypothesis.size() as f64;
-        odds(&without, &with, more) - self.bench().price(own) + wider.price(others)
+        let more = self.fitted.hypothesis.size() as f64 - other.fitted.hypothesis.size() as f64;
+        let price = |best: &Self| best.search.bench.price(best.fitted);
+        odds(&without, &with, more) - price(self) + price(other)
     }
-}
-
-/// A fit with the causes that were found elsewhere, too, in the forms that they have there; `None` where none was, or where they cannot
-/// be so.
-fn in_forms_of(bench: &Bench, own: &Fitted, elsewhere: &Fitted) -> Option<Fitted> {
-    let shared = elsewhere.hypothesis.parts.iter().copied().filter(|part| own.hypothesis.has(part.effect.name));
-    let shared = Hypothesis { parts: shared.collect(), beside: None };
-    if shared.parts.is_empty() || own.hypothesis.names() == elsewhere.hypothesis.names() {
-        return None;
-    }
-    let hypothesis = shared.parts.iter().fold(own.hypothesis.clone(), |all, part| all.in_form_of(*part));
-    let without = shared.parts.iter().fold(own.parameters, |model, part| neutralised(&model, part.effect));
-    let start = shared.at_work_in(&without, &elsewhere.parameters);
-    bench.exact_fit(&hypothesis, &start, Scope::All).filter(Fitted::is_possible)
 }

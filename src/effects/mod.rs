@@ -169,6 +169,8 @@ pub trait Effect: Declared + Default {
     const STATE_SCALES: &'static [f64] = &[];
     /// Parameters whose bounds are neither neutral nor limits of nature: a fit that ends there wanted more, and did not find the cause.
     const ENDS_INSIDE: &'static [&'static str] = &[];
+    /// Whether it changes nothing of a hanging load but what sensors show, after all effects that change more.
+    const IS_OF_SENSOR: bool = false;
 
     /// Whether it changes nothing, whatever its shape parameters are.
     fn is_neutral(&self) -> bool;
@@ -400,6 +402,13 @@ macro_rules! effects {
             /// All effects as they act on where the valve comes to rest, but for what [`Self::rests_off`] says.
             pub fn at_rest(self) -> Self {
                 Self { $($field: self.$field.at_rest(),)* }
+            }
+
+            /// Those that move a hanging load, and those that only change what sensors show of it.
+            pub fn apart(&self) -> [Self; 2] {
+                let mut apart = [*self; 2];
+                $(apart[usize::from(!$Effect::IS_OF_SENSOR)].$field = $Effect::default();)*
+                apart
             }
 
             /// Gauge pressure in Pa by which the valve rests off its target.

@@ -22,13 +22,14 @@ impl Search<'_> {
     /// Hypotheses refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
     /// best and the best that is possible with all of their effects, those that are carried on or may rival it with their last. Where the best leaves no more
     /// than forms may, only its possible rivals are, with all of theirs; other forms are worth the time to single effects, also where the
-    /// best explains enough to be the only cause.
-    pub(super) fn refined_best(&self, judged: Vec<Judged>) -> Vec<Judged> {
+    /// best explains enough to be the only cause. The very best need not be refined where it is `known` as it is then.
+    pub(super) fn refined_best(&self, judged: Vec<Judged>, known: Option<Judged>) -> Vec<Judged> {
         let (ranks, rivals) = (carried_on(&judged), may_rival(&judged));
         // What cannot be leads nothing, however good.
         let leads = judged.iter().position(is_possible);
         let mut others = judged.into_iter().enumerate();
-        let Some(best) = others.next().map(|(_, best)| self.in_best_form(best, None)) else { return Vec::new() };
+        let Some((_, best)) = others.next() else { return Vec::new() };
+        let best = known.unwrap_or_else(|| self.in_best_form(best, None));
         let may_be_form = self.may_be_form(&best.fitted.losses);
         let explains = best.explained > LEAST_EXPLAINED.0;
         let is_close = |(rank, _): &(usize, Judged)| {

@@ -11,6 +11,9 @@ impl Search<'_> {
     /// The best of them that is worth a word: it shows, and has the odds and the share of the error, seen and unseen, that an effect needs
     /// to be named.
     pub(super) fn best_unlisted(&self) -> Option<Judged> {
+        if self.is_sound(&self.baseline.losses) {
+            return None;
+        }
         let shown = Shown::beside(&self.bench.data, &self.baseline.parameters)?;
         let mut each: Vec<Unlisted> = Vec::new();
         for cause in self.most_promising(&shown, Unlisted::all()) {

@@ -9,7 +9,7 @@ use super::Fitting;
 use super::Verdict;
 use super::fits::{Bench, Fitted, Slopes, Start};
 use super::hypothesis::{Hypothesis, Part, has_many_minima, neutralised};
-use super::residuals::{Data, Loss, Scope};
+use super::residuals::{Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
 use evidence::*;
@@ -28,7 +28,7 @@ const MAY_GO_FURTHER: f64 = 0.5;
 const MAY_COME_FURTHER: f64 = 0.2;
 /// Variance, relative to that of the noise, that an effect must take off where what is left without it may be the form of another one, or
 /// coefficients that are off: what is less than the noise itself says nothing of a cause.
-const LEAST_BESIDE_OTHERS: f64 = 1.0;
+pub const LEAST_BESIDE_OTHERS: f64 = 1.0;
 /// How many times the structural error of a sound model, or that share of the span where it has none, an error must be to be
 /// called unexplained.
 const UNEXPLAINED: f64 = 9.75;
@@ -42,6 +42,8 @@ pub const MOST_EFFECTS: usize = 3;
 /// best one's promise from which on up to twice as many are, since then the promise does not tell which.
 const FITTED: (usize, usize) = (9, 5);
 const AS_PROMISING: f64 = 0.98;
+/// Share of the best one's promise below which a single effect is not fitted before rivals count, or more effects than one.
+const LESS_PROMISING: f64 = 0.5;
 /// Starts from which a candidate is fitted, and the share of the first one's promise that a further one must have.
 const STARTS: usize = 2;
 const ALSO_PROMISING: f64 = 0.5;
@@ -71,8 +73,6 @@ pub struct Chosen {
     pub saw_all: bool,
     /// The best fit to all samples, of causes in the library or of one that is in none; that of the baseline where there is no cause.
     pub best: Fitted,
-    /// What the baseline leaves.
-    without: Vec<Loss>,
     /// Per effect of the model, in its order: effects that could stand in its place.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The hypotheses with these effects in their place.
@@ -86,19 +86,6 @@ impl Chosen {
     pub fn names_causes(&self) -> bool {
         !self.model.hypothesis.parts.is_empty()
     }
-
-    /// Whether the best fit to all samples leaves no more than a sound model may and, of several causes, their forms.
-    pub fn says_all(&self, data: &Data) -> bool {
-        match self.best.hypothesis.causes() {
-            0 | 1 => !is_unsound(&self.best.losses, data),
-            _ => may_be_form(&self.without, &self.best.losses, data),
-        }
-    }
-
-    /// Whether the causes take off so much that coefficients that are each off by themselves need not be what they stand for.
-    pub fn shows_beside_coefficients(&self, data: &Data) -> bool {
-        takes_off(&self.without, &self.best.losses, data, LEAST_BESIDE_OTHERS)
-    }
 }
 
 /// The search for the causes of what a baseline leaves.
@@ -106,11 +93,18 @@ pub struct Search<'a> {
     /// The hypotheses' fits.
     pub bench: Bench<'a>,
     fitting: &'a Fitting<'a>,
-    baseline: Fitted,
+    /// The nominal model with its corrections.
+    pub baseline: Fitted,
     /// Whether what the form of one cause may leave is worth a second one.
     minds_form: bool,
     /// Hypotheses of one effect, of two, and so on, the best of each first.
     levels: Vec<Vec<Judged>>,
+    /// The single effect that looks best in its best form, where it is known but the others are not refined yet.
+    best_single: Option<Judged>,
+    /// Whether the single effects are as well as they get.
+    is_refined: bool,
+    /// Starts of the single effects that are not fitted yet since they promise less.
+    unfitted: Vec<Vec<Start>>,
     /// From where each effect alone is best fitted.
     from: Vec<(Part, usize)>,
     /// The best cause that is in no library.
@@ -118,40 +112,74 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search from a baseline, with single effects fitted but not refined; `fitting` is told the effects of each fit. Where another search lets
-    /// the coefficients be off in a way that allows more, what the form of a cause may leave is that one's to explain: else coefficients that are
-    /// off come out as a second cause.
+    /// A search from a baseline, with the most promising single effects fitted but not refined; `fitting` is told the effects of each fit.
+    /// Where another search lets the coefficients be off in a way that allows more, what the form of a cause may leave is that one's to
+    /// explain: else coefficients that are off come out as a second cause.
     pub fn new(bench: Bench<'a>, baseline: Fitted, minds_form: bool, fitting: &'a Fitting<'a>) -> Self {
-        let mut search =
-            Self { bench, fitting, baseline, minds_form, levels: Vec::new(), from: Vec::new(), unlisted: None };
+        let mut search = Self {
+            bench,
+            fitting,
+            baseline,
+            minds_form,
+            levels: Vec::new(),
+            best_single: None,
+            is_refined: false,
+            unfitted: Vec::new(),
+            from: Vec::new(),
+            unlisted: None,
+        };
         let starts = search.starts();
         search.from = best_of_each(&starts);
-        let mut singles = search.fitted(&search.baseline, starts, FITTED.0);
-        if singles.first().is_some_and(|best| best.evidence > LEAST_EVIDENCE) {
-            singles = search.judged_anew(singles);
-        }
-        search.unlisted = if search.is_sound(&search.baseline.losses) { None } else { search.best_unlisted() };
-        search.levels = vec![singles];
+        let least = LESS_PROMISING * starts.iter().map(|starts| starts[0].promise).fold(0.0, f64::max);
+        let (promising, others) = starts.into_iter().partition(|starts| starts[0].promise >= least);
+        search.unfitted = others;
+        let singles = search.fitted(&search.baseline, promising, FITTED.0);
+        search.levels = vec![search.judged_anew(singles)];
+        search.unlisted = search.best_unlisted();
         search
     }
 
-    /// The single effect that leads if only the one that looks best is refined, where it leaves no more than a sound model may.
-    pub fn single_that_says_all(&mut self) -> Option<Fitted> {
-        let mut singles = self.levels.first()?.clone();
-        let best = singles.first_mut()?;
-        *best = self.in_best_form(best.clone(), None);
-        let unrefined = std::mem::replace(&mut self.levels[0], sorted(singles));
-        let leading = self.leading().map(|best| best.fitted.clone());
+    /// Fits those single effects, too, that promise less. One of them may be the best, and tell the noise.
+    fn complete(&mut self) {
+        let (singles, others) = (std::mem::take(&mut self.levels[0]), std::mem::take(&mut self.unfitted));
+        let mut all = self.fitted(&self.baseline, others, FITTED.0.saturating_sub(singles.len()));
+        let is_better = all.first().zip(singles.first()).is_some_and(|(other, best)| other.score > best.score);
+        all.extend(singles);
+        all = sorted(all);
+        if is_better {
+            self.best_single = None;
+            all = self.judged_anew(all);
+            self.unlisted = self.best_unlisted();
+        }
+        self.levels[0] = all;
+    }
+
+    /// The single effect that leads if only the one that looks best is refined; `None` where none has the odds, or a cause in no library has
+    /// them against it. The effects that promise less are not fitted for that.
+    pub fn best_single(&mut self) -> Option<Fitted> {
+        let unrefined = self.levels.first()?.clone();
+        if !self.is_refined {
+            let best = self.in_best_form(unrefined.first()?.clone(), None);
+            self.levels[0] = sorted([&best].into_iter().chain(&unrefined[1..]).cloned().collect());
+            self.best_single = Some(best);
+        }
+        let leading = self.leading().filter(|leading| self.unlisted_instead_of(leading).is_none());
+        let leading = leading.map(|leading| leading.fitted.clone());
         self.levels[0] = unrefined;
-        leading.filter(|leading| !is_unsound(&leading.losses, &self.bench.data))
+        leading
     }
 
     /// Refines the single effects.
-    pub fn refine(&mut self) {
-        if self.may_show() {
-            let singles = std::mem::take(&mut self.levels[0]);
-            self.levels[0] = self.refined_best(singles);
+    fn refine(&mut self) {
+        if self.is_refined {
+            return;
         }
+        self.complete();
+        if self.may_show() {
+            let (singles, best) = (std::mem::take(&mut self.levels[0]), self.best_single.take());
+            self.levels[0] = self.refined_best(singles, best);
+        }
+        self.is_refined = true;
     }
 
     /// Whether another effect than those that were found elsewhere does best alone, by what an effect must have.
@@ -172,8 +200,9 @@ impl<'a> Search<'a> {
         Judged { fitted, evidence, score, explained }
     }
 
-    /// Looks for at most so many effects at once, as long as one more is worth it, and chooses.
+    /// Looks for at most so many effects at once, as long as one more is worth it, and chooses; `None` where a model cannot be simulated.
     pub fn up_to(&mut self, most: usize) -> Option<Chosen> {
+        self.refine();
         while self.goes_on(most) {
             let next = self.next_level(self.levels.last()?);
             self.levels.push(next);
@@ -192,9 +221,9 @@ impl<'a> Search<'a> {
         self.levels.len() < most && self.is_worth_going_on()
     }
 
-    /// Judges fits again with what the first of them shows of the noise.
+    /// Judges fits again with what the first of them shows of the noise, where it has the odds.
     fn judged_anew(&mut self, fits: Vec<Judged>) -> Vec<Judged> {
-        let Some(first) = fits.first() else { return fits };
+        let Some(first) = fits.first().filter(|first| first.evidence > LEAST_EVIDENCE) else { return fits };
         self.bench.refine_noise(&first.fitted.residuals);
         let baseline = self.bench.anew(&self.baseline);
         let fits: Vec<_> = fits.into_par_iter().filter_map(|judged| self.bench.anew(&judged.fitted)).collect();
@@ -228,6 +257,9 @@ impl<'a> Search<'a> {
         let as_good = AS_PROMISING * starts.first().map_or(0.0, |best| best[0].promise);
         let equal = starts.iter().take_while(|starts| starts[0].promise >= as_good).count();
         starts.truncate(equal.clamp(most, 2 * most));
+        if starts.is_empty() {
+            return Vec::new();
+        }
         let Some(slopes) = self.bench.slopes(base) else { return Vec::new() };
         let base = self.judge(base.clone());
         let best = |starts: Vec<Start>| {
@@ -356,7 +388,7 @@ impl<'a> Search<'a> {
     /// Of hypotheses those that may be worth more effects than a level has, each once, refined, the best first.
     fn worth_refining(&self, level: &[Judged], more: Vec<Judged>) -> Vec<Judged> {
         let may_be = |judged: &Judged| possible(level).is_none_or(|fewer| self.further(fewer, judged) > MAY_GO_FURTHER);
-        self.refined_best(first_of_each(sorted(more).into_iter().filter(may_be)))
+        self.refined_best(first_of_each(sorted(more).into_iter().filter(may_be)), None)
     }
 
     /// A hypothesis fitted without one of its effects.

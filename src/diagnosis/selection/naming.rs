@@ -56,7 +56,6 @@ impl Search<'_> {
         Some(Chosen {
             verdict: if is_nominal { Verdict::Nominal } else { Verdict::Unexplained },
             best: unlisted.map_or(&self.baseline, |unlisted| &unlisted.fitted).clone(),
-            without: losses.clone(),
             model: self.bench.exact_fit(hypothesis, parameters, Scope::Training)?,
             saw_all: false,
             alternatives: Vec::new(),
@@ -83,7 +82,6 @@ impl Search<'_> {
             verdict,
             rivals: rivals.into_iter().map(|rival| rival.fitted.clone()).collect(),
             best: best.fitted,
-            without: self.baseline.losses.clone(),
             model: told.model,
             saw_all: !told.holds_out,
             alternatives,
