@@ -27,9 +27,11 @@ impl<T: Clone> Recent<T> {
         known.map_or_else(
             || {
                 let made = make()?;
-                let mut models = models();
-                models.push_front((*model, made.clone()));
-                models.truncate(self.most);
+                if self.most > 0 {
+                    let mut models = models();
+                    models.truncate(self.most - 1);
+                    models.push_front((*model, made.clone()));
+                }
                 Ok(made)
             },
             Ok,

@@ -164,7 +164,8 @@ pub fn diagnose(
     let cannot_follow = || residuals::cannot_follow(recordings);
     let data = Data::new(recordings, nominal, tolerance)?; // a model that cannot be simulated at all is the user's to mend
     let thinned = thinned(recordings);
-    let changes = Changes::new(usize::MAX);
+    // A single way asks for each once.
+    let changes = Changes::new(if Off::ways(nominal).len() > 1 { usize::MAX } else { 0 });
     let prepared = |off: &Off| {
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;

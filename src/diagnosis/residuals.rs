@@ -161,7 +161,7 @@ impl<'a> Data<'a> {
                     .to_owned(),
             });
         }
-        let residuals = data.residuals(nominal).ok_or_else(|| cannot_follow(recordings))?;
+        let residuals = data.residuals_on(recordings, 1, nominal).ok_or_else(|| cannot_follow(recordings))?;
         data.noise = data.noise_in(&residuals);
         data.mistimed = data.mistiming(nominal).unwrap_or_else(|| vec![0.0; data.count()]);
         Ok(data)
@@ -325,9 +325,8 @@ impl<'a> Data<'a> {
 
     /// Simulations of a model, one per recording; `None` where one cannot be done.
     pub fn replays(&self, parameters: &Parameters) -> Option<Vec<Replay>> {
-        let known = self.recordings.par_iter().zip(&self.courses);
         let replayed = |(recording, known)| replay_remembering(parameters, recording, self.integration, known).ok();
-        known.map(replayed).collect()
+        self.recordings.par_iter().zip(&self.courses).map(replayed).collect()
     }
 
     /// Residuals of simulations on recordings whose `every`-th samples are those of this data.

@@ -87,12 +87,14 @@ pub fn better<'a>(
     Ok(Some(if found.best().beats(&other.best()) { found } else { other }))
 }
 
-/// Whether the single effect that looks best beats the one of a way that allows more, where that one leaves nothing; `None` where it does not.
-/// Then several effects would hardly have the odds, and others alone need only be looked for in full where the better one was found.
+/// Whether the single effect that looks best beats the one of a way that allows more, where that one leaves nothing, and neither does the
+/// better one; `None` where that is not so. Then several effects would hardly have the odds, and others alone need only be looked for in full
+/// where the better one was found.
 fn wins_alone(narrow: &mut Search, wide: &mut Search) -> Option<bool> {
     let (own, other) = (narrow.best_single()?, wide.best_single()?);
     let [own, other] = [(&*narrow, &own), (&*wide, &other)].map(|(search, fitted)| Best { search, fitted });
-    other.says_all().then(|| own.beats(&other))
+    let wins = other.says_all().then(|| own.beats(&other))?;
+    (!wins || own.says_all()).then_some(wins)
 }
 
 /// What was found where the coefficients of the nominal model may be off in one way.

@@ -59,7 +59,7 @@ impl Effect for ContractionSensorGain {
     };
     const ENDS_INSIDE: &'static [&'static str] =
         &["contraction_sensor_gain.bend", "contraction_sensor_gain.settling", "contraction_sensor_gain.settling_time"];
-    const IS_OF_SENSOR: bool = true;
+    const IS_OF_READING: bool = true;
 
     as_its_scale!();
 

@@ -61,7 +61,7 @@ impl Effect for ForceSensorGain {
         "force_sensor_gain.settling",
         "force_sensor_gain.settling_time",
     ];
-    const IS_OF_SENSOR: bool = true;
+    const IS_OF_READING: bool = true;
 
     as_its_scale!();
 

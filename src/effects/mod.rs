@@ -169,8 +169,8 @@ pub trait Effect: Declared + Default {
     const STATE_SCALES: &'static [f64] = &[];
     /// Parameters whose bounds are neither neutral nor limits of nature: a fit that ends there wanted more, and did not find the cause.
     const ENDS_INSIDE: &'static [&'static str] = &[];
-    /// Whether it changes nothing of a hanging load but what sensors show, after all effects that change more.
-    const IS_OF_SENSOR: bool = false;
+    /// Whether it only changes readings of a hanging load, each for itself, after all effects that change more.
+    const IS_OF_READING: bool = false;
 
     /// Whether it changes nothing, whatever its shape parameters are.
     fn is_neutral(&self) -> bool;
@@ -404,10 +404,10 @@ macro_rules! effects {
                 Self { $($field: self.$field.at_rest(),)* }
             }
 
-            /// Those that move a hanging load, and those that only change what sensors show of it.
+            /// Those with which a hanging load is simulated, and those that only change its readings then.
             pub fn apart(&self) -> [Self; 2] {
                 let mut apart = [*self; 2];
-                $(apart[usize::from(!$Effect::IS_OF_SENSOR)].$field = $Effect::default();)*
+                $(apart[usize::from(!$Effect::IS_OF_READING)].$field = $Effect::default();)*
                 apart
             }
 

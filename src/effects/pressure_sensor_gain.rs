@@ -54,7 +54,7 @@ impl Effect for PressureSensorGain {
     };
     const ENDS_INSIDE: &'static [&'static str] =
         &["pressure_sensor_gain.bend", "pressure_sensor_gain.settling", "pressure_sensor_gain.settling_time"];
-    const IS_OF_SENSOR: bool = true;
+    const IS_OF_READING: bool = true;
 
     as_its_scale!();
 

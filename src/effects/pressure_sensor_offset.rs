@@ -40,7 +40,7 @@ impl Effect for PressureSensorOffset {
         further_forms: Self::FURTHER_FORMS,
         refinements: Self::REFINEMENTS,
     };
-    const IS_OF_SENSOR: bool = true;
+    const IS_OF_READING: bool = true;
 
     as_its_course!();
 

@@ -141,12 +141,13 @@ impl<'a> Search<'a> {
 
     /// Fits those single effects, too, that promise less. One of them may be the best, and tell the noise.
     fn complete(&mut self) {
-        let (singles, others) = (std::mem::take(&mut self.levels[0]), std::mem::take(&mut self.unfitted));
-        let mut all = self.fitted(&self.baseline, others, FITTED.0.saturating_sub(singles.len()));
-        let is_better = all.first().zip(singles.first()).is_some_and(|(other, best)| other.score > best.score);
-        all.extend(singles);
+        let (mut all, others) = (std::mem::take(&mut self.levels[0]), std::mem::take(&mut self.unfitted));
+        let more = self.fitted(&self.baseline, others, FITTED.0.saturating_sub(all.len()));
+        let is_better = |other: &Judged| all.first().is_none_or(|best| other.score > best.score);
+        let is_another = more.first().is_some_and(is_better);
+        all.extend(more);
         all = sorted(all);
-        if is_better {
+        if is_another {
             self.best_single = None;
             all = self.judged_anew(all);
             self.unlisted = self.best_unlisted();
@@ -157,7 +158,7 @@ impl<'a> Search<'a> {
     /// The single effect that leads if only the one that looks best is refined; `None` where none has the odds, or a cause in no library has
     /// them against it. The effects that promise less are not fitted for that.
     pub fn best_single(&mut self) -> Option<Fitted> {
-        let unrefined = self.levels.first()?.clone();
+        let unrefined = self.levels[0].clone();
         if !self.is_refined {
             let best = self.in_best_form(unrefined.first()?.clone(), None);
             self.levels[0] = sorted([&best].into_iter().chain(&unrefined[1..]).cloned().collect());
@@ -185,7 +186,7 @@ impl<'a> Search<'a> {
     /// Whether another effect than those that were found elsewhere does best alone, by what an effect must have.
     pub fn leads_away_from(&self, found: &Hypothesis) -> bool {
         let is_found = |single: &&Judged| found.has(single.fitted.hypothesis.parts[0].effect.name);
-        let singles = self.levels.first().map_or(&[][..], |singles| singles);
+        let singles = &self.levels[0];
         match (singles.first(), singles.iter().find(is_found)) {
             (Some(best), Some(other)) => evidence(&other.fitted, &best.fitted) > LEAST_EVIDENCE,
             (best, _) => best.is_some(),
