@@ -23,19 +23,16 @@ impl<T: Clone> Recent<T> {
     /// Those of what it takes.
     pub fn get_or<E>(&self, model: &Parameters, make: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
         let models = || self.models.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = models().iter().find(|(known, _)| known == model).map(|(_, of)| of.clone());
-        known.map_or_else(
-            || {
-                let made = make()?;
-                if self.most > 0 {
-                    let mut models = models();
-                    models.truncate(self.most - 1);
-                    models.push_front((*model, made.clone()));
-                }
-                Ok(made)
-            },
-            Ok,
-        )
+        if let Some((_, known)) = models().iter().find(|(known, _)| known == model) {
+            return Ok(known.clone());
+        }
+        let made = make()?;
+        if self.most > 0 {
+            let mut models = models();
+            models.truncate(self.most - 1);
+            models.push_front((*model, made.clone()));
+        }
+        Ok(made)
     }
 }
 

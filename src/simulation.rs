@@ -550,6 +550,7 @@ mod tests {
     fn sensors_behind_a_course_show_what_they_show_within_it() {
         let mut parameters = Parameters::default();
         let of_sensors = Effects::DESCRIPTIONS.iter().filter(|effect| effect.name.contains("_sensor_"));
+        let refined = |effect: &Description| effect.refinements.iter().map(|(name, starts)| (*name, starts[0]));
         let sensors: Vec<_> = of_sensors.flat_map(|effect| effect.typical().chain(refined(effect))).collect();
         let others = [
             ("temperature_drift.force_zero", 20.0),
@@ -577,10 +578,5 @@ mod tests {
                 assert!((within - behind).abs() < close, "{signal:?} {within} {behind}");
             }
         }
-    }
-
-    /// Refinements where fits start with them.
-    fn refined(effect: &Description) -> impl Iterator<Item = (&'static str, f64)> {
-        effect.refinements.iter().map(|(name, starts)| (*name, starts[0]))
     }
 }

@@ -158,16 +158,15 @@ impl<'a> Search<'a> {
     /// The single effect that leads if only the one that looks best is refined; `None` where none has the odds, or a cause in no library has
     /// them against it. The effects that promise less are not fitted for that.
     pub fn best_single(&mut self) -> Option<Fitted> {
-        let unrefined = self.levels[0].clone();
+        let mut singles = self.levels[0].clone();
         if !self.is_refined {
-            let best = self.in_best_form(unrefined.first()?.clone(), None);
-            self.levels[0] = sorted([&best].into_iter().chain(&unrefined[1..]).cloned().collect());
-            self.best_single = Some(best);
+            let best = singles.first_mut()?;
+            *best = self.in_best_form(best.clone(), None);
+            self.best_single = Some(best.clone());
+            singles = sorted(singles);
         }
-        let leading = self.leading().filter(|leading| self.unlisted_instead_of(leading).is_none());
-        let leading = leading.map(|leading| leading.fitted.clone());
-        self.levels[0] = unrefined;
-        leading
+        let leading = possible(&singles).filter(|best| self.leads(best) && self.unlisted_instead_of(best).is_none());
+        leading.map(|leading| leading.fitted.clone())
     }
 
     /// Refines the single effects.
@@ -409,8 +408,7 @@ impl<'a> Search<'a> {
 
     /// The best hypothesis of all levels, each of which must be worth its effects; the first may be of two.
     fn leading(&self) -> Option<&Judged> {
-        let leads =
-            |best: &&Judged| best.evidence > LEAST_EVIDENCE && self.shows(&self.baseline.losses, &best.fitted.losses);
+        let leads = |best: &&Judged| self.leads(best);
         let (singles, further) = self.levels.split_first()?;
         let mut best = possible(singles).filter(leads);
         for level in further {
@@ -419,6 +417,11 @@ impl<'a> Search<'a> {
             best = Some(more);
         }
         best
+    }
+
+    /// Whether a hypothesis may lead where none with fewer effects does: it has the odds, and shows.
+    fn leads(&self, judged: &Judged) -> bool {
+        judged.evidence > LEAST_EVIDENCE && self.shows(&self.baseline.losses, &judged.fitted.losses)
     }
 
     /// Whether a hypothesis with more effects is worth them: it pays, and explains a good part of what is left without.
