@@ -12,7 +12,7 @@
 use super::fits::Bench;
 use super::residuals::Scope;
 use crate::correction::{ActsOn, COEFFICIENTS, Quantity, UnknownCause};
-use crate::least_squares::{Free, derivatives, normal_matrix};
+use crate::least_squares::{Free, derivatives, dot, normal_matrix};
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::simulation::{replay, slopes};
@@ -163,8 +163,7 @@ fn information(linear: &Linear, counts: impl Fn(usize) -> bool) -> (DMatrix<f64>
     };
     let columns: Vec<Vec<f64>> = linear.columns.iter().map(|column| picked(column)).collect();
     let residuals = picked(&linear.residuals);
-    let along = |column: &Vec<f64>| -column.iter().zip(&residuals).map(|(a, b)| a * b).sum::<f64>();
-    let right = DVector::from_iterator(COEFFICIENTS, columns.iter().map(along));
+    let right = DVector::from_iterator(COEFFICIENTS, columns.iter().map(|column| -dot(column, &residuals)));
     (normal_matrix(&columns), right)
 }
 

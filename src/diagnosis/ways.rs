@@ -128,9 +128,10 @@ impl<'a> Found<'a> {
     }
 
     /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
-    /// than here, but a single one that may be another.
+    /// than here, but a single one that may be another; where no second one explains a good part of what one leaves, hardly does it there.
     fn most_beside(&self) -> usize {
         match self.best().causes() {
+            _ if self.search.ends_at_one() => 1,
             0 => MOST_EFFECTS,
             _ if !self.best().says_all() => MOST_EFFECTS,
             causes => (causes - 1).max(1),

@@ -15,7 +15,7 @@ use super::{Limits, Place};
 use crate::GRAVITY;
 use crate::diagnosis::hypothesis::{bounds, declared, with_values};
 use crate::effects::ValveResonance;
-use crate::least_squares::{self, Effort, Ended, Free};
+use crate::least_squares::{self, Effort, Ended, Free, dot};
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::plant::holding_pressure;
@@ -372,10 +372,6 @@ fn difference(a: Option<Readings>, b: &Readings, per: f64) -> Readings {
         }
     }
     result
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 fn position(signal: Signal) -> usize {

@@ -221,6 +221,11 @@ impl<'a> Search<'a> {
         self.levels.len() < most && self.is_worth_going_on()
     }
 
+    /// Whether two effects at once were looked for, and no second one was worth a closer look beside any other one.
+    pub fn ends_at_one(&self) -> bool {
+        self.levels.get(1).is_some_and(Vec::is_empty)
+    }
+
     /// Judges fits again with what the first of them shows of the noise, where it has the odds.
     fn judged_anew(&mut self, fits: Vec<Judged>) -> Vec<Judged> {
         let Some(first) = fits.first().filter(|first| first.evidence > LEAST_EVIDENCE) else { return fits };
