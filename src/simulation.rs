@@ -96,8 +96,8 @@ pub fn replay_within(parameters: &Parameters, recording: &Recording, tolerance: 
     replay_remembering(parameters, recording, tolerance, &Recent::new(0))
 }
 
-/// The same where it is known how a load moved with the models that were simulated last in this recording, to the same tolerance: not what
-/// sensors showed of it.
+/// The same where it is known what the models did that were simulated last in this recording, to the same tolerance; of a load that hangs how
+/// it moved, not what sensors showed of it.
 ///
 /// # Errors
 /// As [`replay`].
@@ -123,7 +123,7 @@ fn replay_chain(
 ) -> Result<Replay> {
     let mut parameters = in_recording(parameters, recording);
     let Some(command) = recording.bridged(Signal::Command) else {
-        return replay_pull(&parameters, recording, tolerance);
+        return known.get_or(&parameters, || replay_pull(&parameters, recording, tolerance));
     };
     parameters.initial.gauge_pressure = initial_pressure(&parameters, recording, &command);
     let time = &recording.time;
@@ -142,18 +142,13 @@ fn replay_chain(
         contraction: motion.contraction(k, pull),
         contraction_velocity: motion.velocity[k],
     };
-    follow::<PneumaticActuator>(
-        &parameters,
-        time,
-        tolerance,
-        inputs,
-        driven_readings,
-        motion.pull(),
-        &[Signal::Contraction],
-    )
+    let given = [Signal::Contraction];
+    let follow =
+        || follow::<PneumaticActuator>(&parameters, time, tolerance, inputs, driven_readings, motion.pull(), &given);
+    known.get_or(&parameters, follow)
 }
 
-/// The parameters as they are in a recording that is one of several.
+/// The parameters as they are in a recording that is one of several, without those that are of others.
 pub(crate) fn in_recording(parameters: &Parameters, recording: &Recording) -> Parameters {
     let mut parameters = *parameters;
     if let Some(number) = recording.number() {
@@ -520,6 +515,7 @@ pub fn closed_loop_on(plant: &Parameters, known: &Parameters, step: f64, duratio
 mod tests {
     use super::*;
     use crate::effects::Description;
+    use crate::variables::Declared;
 
     const PERIOD: f64 = 0.01;
 
@@ -546,6 +542,47 @@ mod tests {
         assert_eq!(rests(25, |time| 2e5 + 1e5 * time), START_SAMPLES, "the pressure still moves");
     }
 
+    fn followed(parameters: &Parameters) -> Replay {
+        let (time, command) = ((0..300).map(|k| PERIOD * f64::from(k)).collect::<Vec<_>>(), command(60));
+        let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
+        let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
+        follow::<PneumaticMuscle>(parameters, &time, TOLERANCE, inputs, shown, None, &[]).unwrap()
+    }
+
+    #[test]
+    fn what_is_of_other_recordings_makes_no_difference_to_one() {
+        let mut of_recordings = Vec::new();
+        Parameters::default().visit(&mut |variable, neutral| {
+            if variable.of_recording > 0 {
+                assert_eq!(neutral, 0.0, "{}", variable.name);
+                of_recordings.push(variable);
+            }
+        });
+        let has = |effect: &&Description| of_recordings.iter().any(|variable| variable.group() == effect.name);
+        let mut least_felt = [usize::MAX; 4];
+        for effect in Effects::DESCRIPTIONS.iter().filter(has) {
+            let mut all = Parameters::default();
+            for variable in of_recordings.iter().filter(|variable| variable.group() == effect.name) {
+                all.set(variable.name, 1e-3 * variable.max).unwrap();
+            }
+            let freed = effect.all_forms().flatten().chain(effect.refinements);
+            freed.for_each(|(name, starts)| all.set(name, starts[0]).unwrap());
+            for (number, least) in (1..=4).zip(&mut least_felt) {
+                let mut in_one = all;
+                in_one.effects.in_recording(number);
+                all.set(&format!("{}.recording", effect.name), number as f64).unwrap();
+                let [without, with] = [&in_one, &all].map(followed);
+                for signal in OUTPUTS {
+                    assert_eq!(without.get(signal), with.get(signal), "{} in recording {number}", effect.name);
+                }
+                let mut felt = 0;
+                in_one.visit(&mut |variable, value| felt += usize::from(variable.of_recording > 0 && value != 0.0));
+                *least = felt.min(*least);
+            }
+        }
+        assert_eq!(least_felt, [0, 1, 1, 0], "all are left out but those of the recording itself");
+    }
+
     #[test]
     fn sensors_behind_a_course_show_what_they_show_within_it() {
         let mut parameters = Parameters::default();
@@ -563,15 +600,9 @@ mod tests {
         }
         let [plant, sensors] = parameters.effects.apart();
         assert_ne!(plant, parameters.effects);
-        let (time, command) = ((0..300).map(|k| PERIOD * f64::from(k)).collect::<Vec<_>>(), command(60));
-        let followed = |effects: Effects| {
-            let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
-            let shown =
-                |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
-            let parameters = Parameters { effects, ..parameters };
-            follow::<PneumaticMuscle>(&parameters, &time, TOLERANCE, inputs, shown, None, &[]).unwrap()
-        };
-        let (within, behind) = (followed(parameters.effects), followed(plant).seen_by(&sensors, &time));
+        let time: Vec<f64> = (0..300).map(|k| PERIOD * f64::from(k)).collect();
+        let behind = followed(&Parameters { effects: plant, ..parameters }).seen_by(&sensors, &time);
+        let within = followed(&parameters);
         for (signal, close) in [(Signal::GaugePressure, 1e-3), (Signal::Contraction, 1e-9), (Signal::Force, 1e-5)] {
             let [within, behind] = [&within, &behind].map(|replay| replay.get(signal).unwrap());
             for (within, behind) in within.iter().zip(behind) {

@@ -123,12 +123,19 @@ pub struct Variable {
     pub kind: Kind,
     /// Which of several recordings it is of, by its number from 1; 0 where it is of all alike.
     pub of_recording: usize,
+    /// Whether it stays so in the recordings that follow.
+    pub stays: bool,
 }
 
 impl Variable {
     /// First part of the name: the group it belongs to.
     pub fn group(&self) -> &'static str {
         self.name.split('.').next().unwrap_or(self.name)
+    }
+
+    /// Whether it makes a difference to one of several recordings, by its number from 1.
+    pub fn is_felt_in(&self, recording: usize) -> bool {
+        self.of_recording == 0 || self.of_recording == recording || self.stays && self.of_recording < recording
     }
 
     /// Whether a parameter may change while simulating.
@@ -223,14 +230,14 @@ pub trait Signals: Declared + Copy + Default + Send {
 }
 
 /// Start, unit and range of every field of a group: `name: type = start, UNIT, min..=max;`, with `of 2` behind the range where it is of the second
-/// of several recordings.
+/// of several recordings, or `since 2` where it stays so in those that follow. What is of a recording does nothing at zero.
 macro_rules! variables {
     (
         $(#[$attribute:meta])*
         pub struct $Struct:ident in $prefix:literal as $role:ident {
             $(
                 #[doc = $description:literal]
-                $field:ident: $type:ty = $start:expr, $unit:ident, $range:expr $(, of $recording:literal)?;
+                $field:ident: $type:ty = $start:expr, $unit:ident, $range:expr $(, of $recording:literal)? $(, since $first:literal)?;
             )*
         }
     ) => {
@@ -256,7 +263,8 @@ macro_rules! variables {
                     max: *$range.end(),
                     role: $crate::variables::Role::$role,
                     kind: <$type as $crate::variables::Scalar>::KIND,
-                    of_recording: 0 $(+ $recording)?,
+                    of_recording: 0 $(+ $recording)? $(+ $first)?,
+                    stays: false $(|| $first > 0)?,
                 },
             )*];
         }
@@ -336,6 +344,7 @@ macro_rules! signals {
                     role: $crate::variables::Role::$role,
                     kind: $crate::variables::Kind::Real,
                     of_recording: 0,
+                    stays: false,
                 },
             )*];
             fn get(&self, position: usize) -> f64 {

@@ -153,11 +153,11 @@ macro_rules! zero {
                 /// Phase of the swing at the start, in rad
                 swing_phase: f64 = 0.0, ONE, (-10.0..=10.0);
                 /// By how much the offset shifts once, as after a shock, in the first of several recordings
-                shift: f64 = 0.0, $unit, (-$most..=$most), of 1;
+                shift: f64 = 0.0, $unit, (-$most..=$most), since 1;
                 /// By how much it shifts in the second
-                second_shift: f64 = 0.0, $unit, (-$most..=$most), of 2;
+                second_shift: f64 = 0.0, $unit, (-$most..=$most), since 2;
                 /// By how much it shifts in the third
-                third_shift: f64 = 0.0, $unit, (-$most..=$most), of 3;
+                third_shift: f64 = 0.0, $unit, (-$most..=$most), since 3;
                 /// When it shifts: the middle of the shift
                 shift_time: f64 = 10.0, SECOND, (0.0..=10000.0);
                 /// How long the shift takes

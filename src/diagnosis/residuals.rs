@@ -27,8 +27,8 @@ const STRUCTURE_SHARE: f64 = 0.02;
 const BLOCK: f64 = 2.0;
 /// A course with more of its variance than this in common with what drives the muscle may come from there.
 const MOST_OF_VARIANCE: f64 = 0.5;
-/// Courses of a load that are kept of each recording: fits of what sensors show change little else.
-const KEPT_COURSES: usize = 16;
+/// Simulations that are kept of each recording: fits of what sensors show change little else, nor do those of what is of another recording.
+const KEPT_COURSES: usize = 32;
 /// No sensor is better than this share of what it shows: data without any noise are simulated.
 const FINEST: f64 = 1e-5;
 
@@ -58,7 +58,7 @@ pub struct Data<'a> {
     pub tolerance: f64,
     /// Tolerance of the integration, see [`integrator::advance`].
     pub integration: f64,
-    /// Per recording, how a load moved there with the models that were simulated last.
+    /// Per recording, what the models did there that were simulated last; see [`replay_remembering`].
     courses: Vec<Recent<Replay>>,
 }
 

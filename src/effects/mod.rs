@@ -186,9 +186,13 @@ pub trait Effect: Declared + Default {
     fn hangs_on_chance(&self) -> bool {
         false
     }
-    /// Has it be as it is in one of several recordings, by its number from 1, where that makes a difference to it.
-    fn in_recording(&mut self, number: f64) {
-        self.visit_mut(&mut |variable, old| if variable.name.ends_with(".recording") { number } else { old });
+    /// Has it be as it is in one of several recordings, by its number from 1, without what makes no difference to that one.
+    fn in_recording(&mut self, number: usize) {
+        self.visit_mut(&mut |variable, old| match variable {
+            _ if variable.name.ends_with(".recording") => number as f64,
+            _ if variable.is_felt_in(number) => old,
+            _ => 0.0,
+        });
     }
     /// By how much later in s the valve answers on average than one of first order with a bandwidth in rad/s.
     fn lateness(&self, _bandwidth: f64) -> f64 {
@@ -393,9 +397,8 @@ macro_rules! effects {
                 false $(|| $Effect::DESCRIPTION.name == name && self.$field.hangs_on_chance())*
             }
 
-            /// Has all effects be as they are in one of several recordings, by its number from 1.
+            /// Has all effects be as they are in one of several recordings, by its number from 1, without what makes no difference to that one.
             pub fn in_recording(&mut self, number: usize) {
-                let number = number as f64;
                 $(self.$field.in_recording(number);)*
             }
 
