@@ -62,13 +62,14 @@ impl<const N: usize> State for [f64; N] {
         &mut self,
         _moving: u64,
         rates: impl Fn(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         tolerance: f64,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
         if N == 0 {
+            witness(0.0, self, duration, self, &|_| Self::ZERO);
             return Ok(());
         }
         integrator::advance(rates, witness, scale, tolerance, self, step, duration)

@@ -550,6 +550,27 @@ mod tests {
     }
 
     #[test]
+    fn a_muscle_that_rests_shows_so_at_every_sample() {
+        const COUNT: usize = 60;
+        let mut text = "time [s],gauge_pressure [bar],contraction [mm],force [N]\n".to_owned();
+        for k in 0..COUNT {
+            let pressure = if k < COUNT / 2 { 2 } else { 1 };
+            text += &format!("{:.2},{pressure},0,500\n", 0.01 * k as f64);
+        }
+        let recording = Recording::parse(text.as_bytes(), std::path::Path::new("rests.csv"), &[]).unwrap();
+        for replayed in [replay, replay_muscle] {
+            let shown = replayed(&Parameters::default(), &recording).unwrap();
+            let force = shown.get(Signal::Force).unwrap();
+            let (first, last) = (force[0], force[force.len() - 1]);
+            assert!(first > last + 100.0, "{first} {last}");
+            assert_eq!(force.len(), COUNT);
+            let [before, after] = [&force[..COUNT / 2], &force[COUNT / 2..]];
+            assert!(before.iter().all(|now| (now - first).abs() < 1e-9), "{before:?}");
+            assert!(after.iter().all(|now| (now - last).abs() < 1e-9), "{after:?}");
+        }
+    }
+
+    #[test]
     fn what_is_of_other_recordings_makes_no_difference_to_one() {
         let mut of_recordings = Vec::new();
         Parameters::default().visit(&mut |variable, neutral| {
