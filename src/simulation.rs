@@ -519,13 +519,17 @@ mod tests {
 
     const PERIOD: f64 = 0.01;
 
+    fn time() -> Vec<f64> {
+        (0..300).map(|k| PERIOD * f64::from(k)).collect()
+    }
+
     /// Held for some samples, then rising.
     fn command(held: usize) -> Vec<f64> {
         (0..300_usize).map(|k| 2.0 + 0.01 * k.max(held) as f64).collect()
     }
 
     fn rests(held: usize, pressure: impl Fn(f64) -> f64) -> usize {
-        let time: Vec<f64> = (0..300).map(|k| PERIOD * f64::from(k)).collect();
+        let time = time();
         // Noise of 300 Pa that a sensor of 400 Pa shows.
         let noise = |k: usize| 400.0 * (0.75 * ((k * k) as f64 * 0.7).sin()).round();
         let readings: Vec<f64> = time.iter().enumerate().map(|(k, time)| pressure(*time) + noise(k)).collect();
@@ -543,10 +547,10 @@ mod tests {
     }
 
     fn followed(parameters: &Parameters) -> Replay {
-        let (time, command) = ((0..300).map(|k| PERIOD * f64::from(k)).collect::<Vec<_>>(), command(60));
+        let command = command(60);
         let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
-        follow::<PneumaticMuscle>(parameters, &time, TOLERANCE, inputs, shown, None, &[]).unwrap()
+        follow::<PneumaticMuscle>(parameters, &time(), TOLERANCE, inputs, shown, None, &[]).unwrap()
     }
 
     #[test]
@@ -621,8 +625,7 @@ mod tests {
         }
         let [plant, sensors] = parameters.effects.apart();
         assert_ne!(plant, parameters.effects);
-        let time: Vec<f64> = (0..300).map(|k| PERIOD * f64::from(k)).collect();
-        let behind = followed(&Parameters { effects: plant, ..parameters }).seen_by(&sensors, &time);
+        let behind = followed(&Parameters { effects: plant, ..parameters }).seen_by(&sensors, &time());
         let within = followed(&parameters);
         for (signal, close) in [(Signal::GaugePressure, 1e-3), (Signal::Contraction, 1e-9), (Signal::Force, 1e-5)] {
             let [within, behind] = [&within, &behind].map(|replay| replay.get(signal).unwrap());
