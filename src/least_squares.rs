@@ -2,8 +2,8 @@
 //!
 //! # Model
 //! Levenberg–Marquardt on Σ r², each step the minimum of the damped quadratic within the bounds. Derivatives are forward
-//! differences, taken in parallel. Those of some parameters may be given: they cost nothing then, and are only updated from what
-//! steps do. A prior counts as one more residual.
+//! differences, taken in parallel, updated from what steps do, and taken anew where one does not do what they promised. Those of some
+//! parameters may be given: they cost nothing then, and are only updated. A prior counts as one more residual.
 //!
 //! # Reference
 //! D. Marquardt (1963), doi 10.1137/0111030; updates: C. Broyden (1965), doi 10.1090/S0025-5718-1965-0198670-6; bounds by
@@ -39,7 +39,7 @@ impl Free {
 /// When a fit stops.
 #[derive(Debug, Clone, Copy)]
 pub struct Effort {
-    /// Most iterations.
+    /// How often derivatives are taken at most.
     pub iterations: usize,
     /// Relative decrease of the cost in one iteration below which a fit is at its end.
     pub small_decrease: f64,
@@ -50,7 +50,7 @@ pub struct Effort {
 pub enum Ended {
     /// No step makes the sum of squares noticeably smaller.
     Converged,
-    /// Still getting smaller after the last allowed iteration.
+    /// Still getting smaller after derivatives were taken as often as is allowed.
     IterationLimit,
     /// The residuals could not be computed at the start.
     NoStart,
@@ -69,8 +69,21 @@ pub struct Fit {
     pub ended: Ended,
 }
 
-/// Steps of growing damping that are tried from one place.
+/// Steps of growing damping that are tried from one place, where derivatives are fresh; else one is.
 const TRIALS: usize = 5;
+
+/// By which share of what derivatives promised a step may miss it for them to be good enough for the next one, updated.
+const SURPRISE: f64 = 0.25;
+
+/// What came of the steps from a place.
+enum Next {
+    /// A place whose cost is smaller, and by how much it was expected to be.
+    Better(Place, f64),
+    /// None that was tried was better.
+    Worse,
+    /// None is worth the way.
+    NotWorth,
+}
 
 /// What is minimised.
 struct Problem<'a, R> {
@@ -100,23 +113,13 @@ where
     };
     let mut columns = vec![Vec::new(); problem.unknown];
     columns.extend(known.iter().zip(&free[problem.unknown..]).map(|(slope, free)| scaled(slope, free.typical)));
-    let mut damping = 1e-3;
-    let mut ended = Ended::IterationLimit;
+    let (mut damping, mut ended) = (1e-3, Ended::IterationLimit);
     for _ in 0..effort.iterations {
         problem.look(&mut columns, &current);
-        let (normal, gradient) = problem.normal_equations(&columns, &current);
-        let least = effort.small_decrease * current.cost;
-        let Some(better) = problem.better(&normal, &gradient, &current, &mut damping, least) else {
-            ended = Ended::Converged;
-            break;
-        };
-        let before = std::mem::replace(&mut current, better);
-        if before.cost - current.cost <= least {
+        if problem.follow(&mut columns, &mut current, &mut damping, effort.small_decrease) {
             ended = Ended::Converged;
             break;
         }
-        let step = problem.step_between(&before.parameters, &current.parameters);
-        update(&mut columns, &step, &before.residuals, &current.residuals);
     }
     Fit { parameters: current.parameters, residuals: current.residuals, cost: current.cost, ended }
 }
@@ -179,7 +182,33 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
         (normal, gradient)
     }
 
-    /// The next place whose cost is smaller, if there is one that is worth the way.
+    /// Goes on from a place for as long as steps do what derivatives promise, which are fresh there and then updated; whether that is the end.
+    fn follow(&self, columns: &mut [Vec<f64>], from: &mut Place, damping: &mut f64, small_decrease: f64) -> bool {
+        let mut trials = TRIALS;
+        loop {
+            let (normal, gradient) = self.normal_equations(columns, from);
+            let least = small_decrease * from.cost;
+            let (better, expected) = match self.better(&normal, &gradient, from, damping, least, trials) {
+                Next::Better(place, expected) => (place, expected),
+                Next::Worse if trials < TRIALS => return false,
+                Next::Worse | Next::NotWorth => return true,
+            };
+            let before = std::mem::replace(from, better);
+            let decrease = before.cost - from.cost;
+            let are_good = (decrease / expected - 1.0).abs() < SURPRISE;
+            if decrease <= least && (trials == TRIALS || are_good) {
+                return true;
+            }
+            let step = self.step_between(&before.parameters, &from.parameters);
+            update(columns, &step, &before.residuals, &from.residuals);
+            if !are_good {
+                return false;
+            }
+            trials = 1;
+        }
+    }
+
+    /// The next place whose cost is smaller, if there is one that is worth the way, with so many trials.
     fn better(
         &self,
         normal: &DMatrix<f64>,
@@ -187,19 +216,21 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
         from: &Place,
         damping: &mut f64,
         least: f64,
-    ) -> Option<Place> {
-        for _ in 0..TRIALS {
+        trials: usize,
+    ) -> Next {
+        for _ in 0..trials {
             let trial = step(normal, gradient, self.free, &from.parameters, *damping);
-            if self.expected_decrease(normal, gradient, from, &trial) < least {
-                return None;
+            let expected = self.expected_decrease(normal, gradient, from, &trial);
+            if expected < least {
+                return Next::NotWorth;
             }
             if let Some(better) = self.place(&trial).filter(|trial| trial.cost < from.cost) {
                 *damping = (*damping * 0.1).max(1e-12);
-                return Some(better);
+                return Next::Better(better, expected);
             }
             *damping *= 10.0;
         }
-        None
+        Next::Worse
     }
 
     /// The way from some parameters to others, in their typical sizes.
@@ -336,6 +367,19 @@ mod tests {
         let found = fit(&rosenbrock, &[free(-1.2, -5.0, 5.0), free(1.0, -5.0, 5.0)], &[], EFFORT);
         assert_eq!(found.ended, Ended::Converged);
         assert!((found.parameters[0] - 1.0).abs() < 1e-3 && (found.parameters[1] - 1.0).abs() < 2e-3, "{found:?}");
+    }
+
+    #[test]
+    fn derivatives_that_hold_are_taken_once() {
+        let evaluations = std::sync::atomic::AtomicUsize::new(0);
+        let nearly_linear = |p: &[f64]| {
+            evaluations.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            Some(p.iter().map(|p| p - 1.0 + 0.01 * p.sin()).chain([0.5]).collect())
+        };
+        let found = fit(&nearly_linear, &[free(0.3, -9.0, 9.0); 5], &[], EFFORT);
+        assert!((found.cost - 0.25).abs() < 1e-6, "{found:?}");
+        // The start, five derivatives, and a few steps.
+        assert!(evaluations.into_inner() < 6 + 5);
     }
 
     #[test]

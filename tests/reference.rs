@@ -142,6 +142,14 @@ fn effects_agree_with_scipy() {
             ],
         ),
         ("slower_when_short", &[("valve_lag.time_constant", 0.03), ("valve_lag.growth_with_contraction", 0.7)]),
+        (
+            "slow_near_target",
+            &[
+                ("valve_lag.time_constant", 0.03),
+                ("valve_lag.excess_near_target", 2.0),
+                ("valve_lag.near_target", 0.15e5),
+            ],
+        ),
         ("slow_tail", &[("valve_lag.second_time_constant", 0.8), ("valve_lag.second_share", 0.15)]),
         (
             "averaged_position",

@@ -57,6 +57,9 @@ crate::variables::variables! {
     }
 }
 
+/// Power of the missing pressure from which on what is limited goes with it nearly as in a valve of first order, as in laminar flow: that is a
+/// lag.
+const LAMINAR: f64 = 0.9;
 /// Pressure in Pa that is taken to be missing at least; not physical, it keeps a limit that goes with it above zero.
 const LEAST_MISSING: f64 = 10.0;
 /// Share of the choked flow that there is at least; not physical, it keeps a limit above zero.
@@ -163,6 +166,10 @@ impl Effect for FlowLimit {
 
     fn is_neutral(&self) -> bool {
         self.filling >= NONE && self.emptying >= NONE
+    }
+
+    fn is_plausible(&self) -> bool {
+        self.exponent < LAMINAR
     }
 
     fn pressure_rate(&self, at: &Point, _own: &[f64], rate: f64) -> f64 {

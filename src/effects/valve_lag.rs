@@ -19,7 +19,8 @@ crate::variables::variables! {
     ///
     /// # Model
     /// 1/ω ← 1/ω + τ (1 + g (p/p₀ − 1) + h x/0.1 m), times 1 + e while emptying: `time_constant` τ of a long muscle at
-    /// p₀ = 2 bar, its `growth_with_pressure` g and, with the volume, `growth_with_contraction` h, `emptying_excess` e. A
+    /// p₀ = 2 bar, its `growth_with_pressure` g and, with the volume, `growth_with_contraction` h, `emptying_excess` e; of a pilot that
+    /// opens little for small errors times 1 + n/(1 + |p_target − p|/pₙ), `excess_near_target` n, `near_target` pₙ. A
     /// hose or pilot stage before the valve is a pole of its own: τ₂ dq/dt = p_target − q, and the valve goes for q:
     /// `second_time_constant` τ₂; with both, one after the other, `third_time_constant` τ₃. Where only a `second_share` c of the way takes the
     /// second pole, as of a stage that is adjusted slowly, the valve goes for p_target + c (q − p_target).
@@ -49,6 +50,10 @@ crate::variables::variables! {
         growth_with_contraction: f64 = 0.0, ONE, (-0.9..=5.0);
         /// Relative excess of the additional time constant while emptying
         emptying_excess: f64 = 0.0, ONE, (-0.9..=5.0);
+        /// Relative excess of the additional time constant at the target
+        excess_near_target: f64 = 0.0, ONE, (0.0..=20.0);
+        /// Missing pressure at which half of that excess is gone
+        near_target: f64 = 2e4, PASCAL, (5e2..=5e5);
     }
 }
 
@@ -66,13 +71,21 @@ impl Effect for ValveLag {
     const DESCRIPTION: Description = Description {
         name: "valve_lag",
         meaning: "the valve is slower than nominal",
-        equation: "1/w <- 1/w + tau (1 + g (p/p0 - 1) + h x/0.1 m);  tau2 dq/dt = p_target - q;  tau3 dr/dt = q - r",
+        equation: "1/w <- 1/w + tau (1 + g (p/p0 - 1) + h x/0.1 m) (1 + n/(1 + |p_target - p|/p_n));  tau2 dq/dt = p_target - q;  tau3 dr/dt = q - r",
         signature: "pressure residual in proportion to the rate of pressure, gone when slow",
         experiment: "steps of several sizes with pressure recorded",
         reference: "thesis eq. 5.3",
         of_load: false,
         holds: Holds::AsLaw,
-        forms: &[&[("valve_lag.time_constant", &[0.05])], &[("valve_lag.second_time_constant", &[0.05])]],
+        forms: &[
+            &[("valve_lag.time_constant", &[0.05])],
+            &[("valve_lag.second_time_constant", &[0.05])],
+            &[
+                ("valve_lag.time_constant", &[0.03]),
+                ("valve_lag.excess_near_target", &[1.5]),
+                ("valve_lag.near_target", &[2e4]),
+            ],
+        ],
         further_forms: &[&[
             ("valve_lag.second_time_constant", &[0.3, 1.0]),
             ("valve_lag.second_share", &[0.1]),
@@ -87,6 +100,7 @@ impl Effect for ValveLag {
             ("valve_lag.growth_with_contraction", &[0.3]),
         ],
     };
+    const ENDS_INSIDE: &'static [&'static str] = &["valve_lag.near_target"];
     const STATE_SCALES: &'static [f64] = &[1e5, 1e5];
 
     fn is_neutral(&self) -> bool {
@@ -132,12 +146,17 @@ impl Effect for ValveLag {
         let with_pressure = self.growth_with_pressure * (at.relative_pressure() - 1.0);
         let with_contraction = self.growth_with_contraction * at.relative_contraction();
         let growth = (1.0 + with_pressure + with_contraction).max(LEAST_SHARE);
-        let emptying = if at.target_pressure < at.gauge_pressure { 1.0 + self.emptying_excess } else { 1.0 };
-        1.0 / (1.0 / bandwidth + self.time_constant * growth * emptying)
+        let missing = at.target_pressure - at.gauge_pressure;
+        let emptying = if missing < 0.0 { 1.0 + self.emptying_excess } else { 1.0 };
+        let near_target = 1.0 + self.excess_near_target / (1.0 + missing.abs() / self.near_target);
+        1.0 / (1.0 / bandwidth + self.time_constant * growth * emptying * near_target)
     }
 
     fn sentence(&self) -> String {
-        let longer = format!("its time constant is {:.0} ms longer", 1e3 * self.time_constant);
+        let mut longer = format!("its time constant is {:.0} ms longer", 1e3 * self.time_constant);
+        if self.excess_near_target > 0.0 {
+            let _ = write!(longer, ", {:.0} ms near its target", 1e3 * self.time_constant * (1.0 + self.excess_near_target));
+        }
         let before =
             |what: &str, time: f64| format!("a {what} delay of first order, {:.0} ms, comes before it", 1e3 * time);
         let mut second = before("second", self.second_time_constant);

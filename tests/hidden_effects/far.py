@@ -755,6 +755,7 @@ SINCE_HELD = [
     SettlingZero,
     ShortMiddle,
     ShutNearTarget,
+    SlowNearTarget,
     SoftPlay,
     SteepFriction,
     Throttle,

@@ -229,6 +229,14 @@ class SlowerWhenShort(Plant):
         return (target - pressure) / (1 / VALVE_BANDWIDTH + 0.03 * (1 + 7 * x))
 
 
+class SlowNearTarget(Plant):
+    """A pilot that opens little for small errors: half of what is added there is gone at 0.15 bar."""
+
+    def pressure_rate(self, target, pressure, x, own):
+        error = target - pressure
+        return error / (1 / VALVE_BANDWIDTH + 0.03 + 0.06 / (1 + abs(error) / 0.15e5))
+
+
 class SlowTail(Plant):
     """A stage that is adjusted slowly gives the last 15 % of the way."""
 
@@ -813,6 +821,7 @@ CASES = [
     Case("regulator", Regulator(), STAIRS),
     Case("slow_regulator", SlowRegulator(), STAIRS),
     Case("slower_when_short", SlowerWhenShort(), STAIRS),
+    Case("slow_near_target", SlowNearTarget(), STAIRS),
     Case("slow_tail", SlowTail(), STAIRS),
     Case("uneven_dead_time", UnevenDeadTime(), RAMPS),
     Case("averaged_position", AveragedPosition(), RAMPS),

@@ -332,15 +332,20 @@ impl<'a> Search<'a> {
     /// The most promising hypotheses with one effect more than those of a level, the best first. Of the best, and of the best that can be, effects
     /// are exchanged for others until no other one becomes the best by that.
     fn next_level(&self, level: &[Judged]) -> Vec<Judged> {
-        let mut bases = carried_on(level);
-        // What forms may leave is looked into only where the best leaves it.
+        let bases = carried_on(level);
+        // What forms may leave is looked into where the best leaves it first.
         let is_form_alone = level.first().is_some_and(|best| self.may_be_form(&best.fitted.losses));
-        if is_form_alone {
-            bases.truncate(1);
-        }
-        let mut next = self.extended(level, &bases);
-        if next.is_empty() && effects_of(level) == 1 && !is_form_alone {
-            next = self.extended(level, &not_carried_on(level, &bases));
+        let (first, others) = if is_form_alone {
+            (&bases[..1], bases[1..].to_vec())
+        } else {
+            (&bases[..], not_carried_on(level, &bases))
+        };
+        let mut next = self.extended(level, first);
+        let is_worth = |more: &Judged| possible(level).is_some_and(|fewer| self.is_worth(fewer, more));
+        let is_missed = if is_form_alone { !next.iter().any(is_worth) } else { next.is_empty() };
+        if is_missed && effects_of(level) == 1 {
+            next.extend(self.extended(level, &others));
+            next = each_once(next);
         }
         let mut exchanged_in: Vec<Vec<&str>> = Vec::new();
         loop {
