@@ -4,6 +4,9 @@ use super::{Description, Effect, Holds, Point, exponential};
 const LEAST_GROWTH: f64 = -1.0;
 const MOST_GROWTH: f64 = 3.0;
 const MOST_CURVATURE: f64 = 1.0;
+/// Relative change of the nominal force at 0.1 m beyond which a tube that adds its force does not go with one the other way: these would
+/// cancel, and what is left of both may have any course.
+const MOST_OPPOSED: f64 = 0.1;
 
 crate::variables::variables! {
     /// A membrane that is stiffer or softer than nominal.
@@ -73,6 +76,11 @@ impl Effect for BladderStiffness {
 
     fn is_neutral(&self) -> bool {
         [self.relative_change, self.change_with_contraction, self.added_force] == [0.0; 3]
+    }
+
+    fn is_plausible(&self) -> bool {
+        let change = self.relative_change + self.change_with_contraction;
+        change.abs() <= MOST_OPPOSED || change * self.added_force >= 0.0
     }
 
     fn elastic_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
