@@ -9,15 +9,34 @@
 //! J. Dormand, P. Prince (1980), A family of embedded Runge–Kutta formulae, doi 10.1016/0771-050X(80)90013-3;
 //! E. Hairer, S. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, II.4 and II.6.
 
-/// Error of one step, relative to the scale of each state, that is accepted where nothing else is asked for.
-pub const TOLERANCE: f64 = 5e-9;
+/// How precisely a system is integrated, and how long that may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy {
+    /// Error of one step, relative to the scale of each state, that is accepted.
+    pub tolerance: f64,
+    /// Steps per second beyond which a call gives up; a few are allowed to each besides.
+    pub most_steps: f64,
+}
+
+impl Accuracy {
+    /// Where nothing else is asked for.
+    pub const USUAL: Self = Self { tolerance: 5e-9, most_steps: f64::INFINITY };
+
+    /// Most steps of a call over a duration in s.
+    fn most_steps_over(self, duration: f64) -> usize {
+        (FEW_STEPS + self.most_steps * duration).min(MOST_STEPS) as usize
+    }
+}
+
 const LARGEST_STEP: f64 = 0.05;
 const SMALLEST_STEP: f64 = 1e-9;
 /// Share of the step that the error allows which is taken, and the error below which no longer one is.
 const SAFETY: f64 = 0.9;
 const LEAST_ERROR: f64 = 1e-4;
 /// A call that needs more steps than this would keep its caller waiting for seconds: the parameters make no sense.
-const MOST_STEPS: usize = 10_000_000;
+const MOST_STEPS: f64 = 1e7;
+/// What a corner of the course takes, and much more.
+const FEW_STEPS: f64 = 500.0;
 
 /// Coefficients of the stages (Butcher tableau), without the first row.
 const A: [&[f64]; 6] = [
@@ -58,7 +77,7 @@ pub struct Failed {
 ///
 /// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness(t0, y0, t1, y1, y)` is
 /// told of every accepted step, with the solution `y(t)` within it; `scale` is the usual size of each state, and
-/// `tolerance` the error of one step relative to it; `step` is the step proposed by the last call and is updated.
+/// `accuracy` the error of one step relative to it, and how many may be made; `step` is the step proposed by the last call and is updated.
 ///
 /// # Errors
 /// [`Failed`] when a state is not finite, the step would fall below a nanosecond, or the steps are too many; `state` is
@@ -68,7 +87,7 @@ pub fn advance<const N: usize>(
     rates: impl Fn(f64, &[f64; N], &mut [f64; N]),
     mut witness: impl FnMut(f64, &[f64; N], f64, &[f64; N], &dyn Fn(f64) -> [f64; N]),
     scale: &[f64; N],
-    tolerance: f64,
+    accuracy: Accuracy,
     state: &mut [f64; N],
     step: &mut f64,
     duration: f64,
@@ -76,14 +95,14 @@ pub fn advance<const N: usize>(
     let mut time = 0.0;
     let mut stages = [[0.0; N]; 7];
     rates(0.0, state, &mut stages[0]);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..accuracy.most_steps_over(duration) {
         let rest = duration - time;
         // A rest that is hardly longer than the step is done in one, not in one and a sliver.
         let last = rest <= *step * 1.000_001;
         let h = if last { rest } else { *step };
         let next = one_step(&rates, time, h, state, &mut stages);
         let (error, worst) = scaled_error(&stages, h, scale, state, &next);
-        let error = error / tolerance;
+        let error = error / accuracy.tolerance;
         if error <= 1.0 {
             let within = |t: f64| within_step((t - time) / h, h, state, &next, &stages);
             witness(time, state, time + h, &next, &within);
@@ -204,7 +223,8 @@ mod tests {
         for call in [1e-4, 1e-3, 1e-2, 0.25, 1.0] {
             let (mut state, mut step) = ([1.0, 0.0, 1.0], 1e-3);
             for _ in 0..(1.0_f64 / call).round() as usize {
-                advance(rates, |_, _, _, _, _| {}, &[1.0, 10.0, 1.0], TOLERANCE, &mut state, &mut step, call).unwrap();
+                advance(rates, |_, _, _, _, _| {}, &[1.0, 10.0, 1.0], Accuracy::USUAL, &mut state, &mut step, call)
+                    .unwrap();
             }
             let exact = [10.0_f64.cos(), -10.0 * 10.0_f64.sin(), (-3.0_f64).exp()];
             for (is, should) in state.iter().zip(exact) {
@@ -224,7 +244,16 @@ mod tests {
                     most = within(t).iter().zip(exact).fold(most, |most, (is, should)| most.max((is - should).abs()));
                 }
             };
-            advance(rates, witness, &[1.0, 10.0, 1.0], 1.0, &mut [1.0, 0.0, 1.0], &mut h.clone(), h).unwrap();
+            advance(
+                rates,
+                witness,
+                &[1.0, 10.0, 1.0],
+                Accuracy { tolerance: 1.0, ..Accuracy::USUAL },
+                &mut [1.0, 0.0, 1.0],
+                &mut h.clone(),
+                h,
+            )
+            .unwrap();
             most
         };
         let (whole, half) = (largest_error(0.04), largest_error(0.02));
@@ -234,13 +263,27 @@ mod tests {
     #[test]
     fn an_explosion_is_reported_with_its_time() {
         let explode = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = y[0] * y[0];
-        let failed = advance(explode, |_, _, _, _, _| {}, &[1.0], TOLERANCE, &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
+        let failed =
+            advance(explode, |_, _, _, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
         assert!((failed.after - 1.0).abs() < 1e-3, "1/(1 - t) ends at 1 s, not {}", failed.after);
     }
 
     #[test]
     fn a_stiffness_without_sense_ends() {
         let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e12 * y[0];
-        assert!(advance(stiff, |_, _, _, _, _| {}, &[1.0], TOLERANCE, &mut [1.0], &mut 1e-3, 1.0).is_err());
+        assert!(advance(stiff, |_, _, _, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, 1.0).is_err());
+    }
+
+    #[test]
+    fn what_takes_too_many_steps_ends_early() {
+        let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e6 * y[0];
+        let within = |most_steps: f64| {
+            let accuracy = Accuracy { most_steps, ..Accuracy::USUAL };
+            advance(stiff, |_, _, _, _, _| {}, &[1.0], accuracy, &mut [1.0], &mut 1e-6, 0.1)
+        };
+        // Stability allows steps of 3.3 µs.
+        assert_eq!(within(1e6), Ok(()));
+        let failed = within(1e5).unwrap_err();
+        assert!(failed.state.is_none() && failed.after < 0.05, "{failed:?}");
     }
 }

@@ -3,7 +3,7 @@
 //! A [`System`] is the equations; a [`Simulator`] integrates them; [`Model`] is the simulator without its type.
 
 use crate::effects::{Description, Effects};
-use crate::integrator;
+use crate::integrator::{self, Accuracy};
 use crate::memory::Memory;
 use crate::muscle::ForceModels;
 use crate::parameters::Parameters;
@@ -43,7 +43,7 @@ pub trait State: Copy + Send {
         rates: impl Fn(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
-        tolerance: f64,
+        accuracy: Accuracy,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed>;
@@ -64,7 +64,7 @@ impl<const N: usize> State for [f64; N] {
         rates: impl Fn(f64, &Self, &mut Self),
         mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
-        tolerance: f64,
+        accuracy: Accuracy,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
@@ -72,7 +72,7 @@ impl<const N: usize> State for [f64; N] {
             witness(0.0, self, duration, self, &|_| Self::ZERO);
             return Ok(());
         }
-        integrator::advance(rates, witness, scale, tolerance, self, step, duration)
+        integrator::advance(rates, witness, scale, accuracy, self, step, duration)
     }
 }
 
@@ -91,7 +91,7 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
         rates: impl Fn(f64, &Self, &mut Self),
         mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
-        tolerance: f64,
+        accuracy: Accuracy,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
@@ -104,7 +104,7 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
             witness(t0, &with(y0), t1, &with(y1), &|t| with(&within(t)));
         };
         let mut some = of(self);
-        some.advance(0, rates, witness, &of(scale), tolerance, step, duration)?;
+        some.advance(0, rates, witness, &of(scale), accuracy, step, duration)?;
         *self = with(&some);
         Ok(())
     }
@@ -125,7 +125,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         rates: impl Fn(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
-        tolerance: f64,
+        accuracy: Accuracy,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
@@ -139,7 +139,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
                 all.0[..OWN].copy_from_slice(own);
                 all
             };
-            self.advance_some(of, with, rates, witness, scale, tolerance, step, duration)
+            self.advance_some(of, with, rates, witness, scale, accuracy, step, duration)
         } else if all_moving.count_ones() as usize <= FEW {
             let positions = positions(all_moving);
             let of = |all: &Self| positions.map(|position| all.0[position]);
@@ -148,14 +148,14 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
                 positions.iter().zip(few).for_each(|(position, value)| all.0[*position] = *value);
                 all
             };
-            let arrived = self.advance_some(of, with, rates, witness, scale, tolerance, step, duration);
+            let arrived = self.advance_some(of, with, rates, witness, scale, accuracy, step, duration);
             let named = |failed: integrator::Failed| integrator::Failed {
                 state: failed.state.map(|few| positions[few]),
                 ..failed
             };
             arrived.map_err(named)
         } else {
-            self.advance_some(|all| all.0, |all| Self(*all), rates, witness, scale, tolerance, step, duration)
+            self.advance_some(|all| all.0, |all| Self(*all), rates, witness, scale, accuracy, step, duration)
         }
     }
 }
@@ -398,7 +398,7 @@ pub struct Simulator<S: System> {
     /// Derivatives of the inputs, per second; they hold for one step.
     pub slopes: S::Inputs,
     /// See [`integrator::advance`].
-    pub tolerance: f64,
+    pub accuracy: Accuracy,
     clock: Clock,
     state: S::State,
     step: f64,
@@ -413,8 +413,8 @@ impl<S: System> Simulator<S> {
     pub fn new(parameters: Parameters) -> Self {
         let (inputs, slopes) = (S::Inputs::default(), S::Inputs::default());
         let memory = S::Memory::default();
-        let (tolerance, state) = (integrator::TOLERANCE, S::State::ZERO);
-        Self { parameters, inputs, slopes, tolerance, clock: Clock::default(), state, step: FIRST_STEP, memory }
+        let (accuracy, state) = (Accuracy::USUAL, S::State::ZERO);
+        Self { parameters, inputs, slopes, accuracy, clock: Clock::default(), state, step: FIRST_STEP, memory }
     }
 
     /// Time in s.
@@ -492,7 +492,7 @@ impl<S: System> Simulator<S> {
         instants: &[f64],
         see: &mut dyn FnMut(S::Outputs),
     ) -> Result<(S::State, f64)> {
-        let Self { ref parameters, inputs, slopes, tolerance, clock, mut state, mut step, ref mut memory } = *self;
+        let Self { ref parameters, inputs, slopes, accuracy, clock, mut state, mut step, ref mut memory } = *self;
         let time = clock.time;
         let coming = Step { parameters, time, state, inputs, slopes, duration };
         let extent = S::extent(parameters);
@@ -516,7 +516,7 @@ impl<S: System> Simulator<S> {
                     see(S::outputs(parameters, clock, &inputs, &within(instant - after), memory));
                 }
             };
-            let passed = state.advance(extent.moving(), rates, witness, &S::SCALE, tolerance, &mut step, span);
+            let passed = state.advance(extent.moving(), rates, witness, &S::SCALE, accuracy, &mut step, span);
             passed.map_err(|failed| diverged::<S>(time + after, &failed))?;
             // On, even where a passage is shorter than rounding.
             after = if span < duration - after { (after + span).max(after.next_up()) } else { duration };
@@ -763,10 +763,10 @@ mod tests {
                 seen.push(within(0.5 * t1).0);
             };
             let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_all, t1, within);
-            all.advance(u64::MAX >> 2, rates, witness, &scale, 1e-8, &mut step_of_all, 0.1).unwrap();
+            all.advance(u64::MAX >> 2, rates, witness, &scale, Accuracy::USUAL, &mut step_of_all, 0.1).unwrap();
             let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_moving, t1, within);
             let moves = 1 << 2 | 1 << 11;
-            moving.advance(moves, rates, witness, &scale, 1e-8, &mut step_of_moving, 0.1).unwrap();
+            moving.advance(moves, rates, witness, &scale, Accuracy::USUAL, &mut step_of_moving, 0.1).unwrap();
         }
         assert_eq!((all, step_of_all, &instants[0]), (moving, step_of_moving, &instants[1]));
         assert!(all.0[13] != start.0[13] && all.0[12] == start.0[12] && !instants[0].is_empty());

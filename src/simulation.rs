@@ -2,7 +2,7 @@
 
 use crate::controller::PidFeedForward;
 use crate::effects::{Effects, Readings};
-use crate::integrator::TOLERANCE;
+use crate::integrator::Accuracy;
 use crate::measurement::{Recording, Signal};
 use crate::model::{Simulator, System};
 use crate::parameters::Parameters;
@@ -85,18 +85,18 @@ const HELD: f64 = 1e-3;
 /// # Errors
 /// [`Error::Replay`], with what the simulation failed of.
 pub fn replay(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
-    replay_within(parameters, recording, TOLERANCE)
+    replay_within(parameters, recording, Accuracy::USUAL)
 }
 
-/// As [`replay`], with a tolerance of the integration as in [`crate::integrator::advance`].
+/// As [`replay`], with an accuracy of the integration.
 ///
 /// # Errors
 /// As [`replay`].
-pub fn replay_within(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
-    replay_remembering(parameters, recording, tolerance, &Recent::new(0))
+pub fn replay_within(parameters: &Parameters, recording: &Recording, accuracy: Accuracy) -> Result<Replay> {
+    replay_remembering(parameters, recording, accuracy, &Recent::new(0))
 }
 
-/// The same where it is known what the models did that were simulated last in this recording, to the same tolerance; of a load that hangs how
+/// The same where it is known what the models did that were simulated last in this recording, to the same accuracy; of a load that hangs how
 /// it moved, not what sensors showed of it.
 ///
 /// # Errors
@@ -104,10 +104,10 @@ pub fn replay_within(parameters: &Parameters, recording: &Recording, tolerance: 
 pub(crate) fn replay_remembering(
     parameters: &Parameters,
     recording: &Recording,
-    tolerance: f64,
+    accuracy: Accuracy,
     known: &Recent<Replay>,
 ) -> Result<Replay> {
-    replay_chain(parameters, recording, tolerance, known).map_err(|error| in_file(recording, error))
+    replay_chain(parameters, recording, accuracy, known).map_err(|error| in_file(recording, error))
 }
 
 /// An error with the recording that it is one of.
@@ -118,12 +118,12 @@ fn in_file(recording: &Recording, error: Error) -> Error {
 fn replay_chain(
     parameters: &Parameters,
     recording: &Recording,
-    tolerance: f64,
+    accuracy: Accuracy,
     known: &Recent<Replay>,
 ) -> Result<Replay> {
     let mut parameters = in_recording(parameters, recording);
     let Some(command) = recording.bridged(Signal::Command) else {
-        return known.get_or(&parameters, || replay_pull(&parameters, recording, tolerance));
+        return known.get_or(&parameters, || replay_pull(&parameters, recording, accuracy));
     };
     parameters.initial.gauge_pressure = initial_pressure(&parameters, recording, &command);
     let time = &recording.time;
@@ -133,7 +133,7 @@ fn replay_chain(
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
         let [plant, sensors] = parameters.effects.apart();
         let plant = Parameters { effects: plant, ..parameters };
-        let follow = || follow::<PneumaticMuscle>(&plant, time, tolerance, inputs, shown, None, &[]);
+        let follow = || follow::<PneumaticMuscle>(&plant, time, accuracy, inputs, shown, None, &[]);
         return Ok(known.get_or(&plant, follow)?.seen_by(&sensors, time));
     }
     let motion = Motion::of(&parameters, recording);
@@ -144,7 +144,7 @@ fn replay_chain(
     };
     let given = [Signal::Contraction];
     let follow =
-        || follow::<PneumaticActuator>(&parameters, time, tolerance, inputs, driven_readings, motion.pull(), &given);
+        || follow::<PneumaticActuator>(&parameters, time, accuracy, inputs, driven_readings, motion.pull(), &given);
     known.get_or(&parameters, follow)
 }
 
@@ -162,10 +162,11 @@ pub(crate) fn in_recording(parameters: &Parameters, recording: &Recording) -> Pa
 /// # Errors
 /// As [`replay`].
 pub fn replay_muscle(parameters: &Parameters, recording: &Recording) -> Result<Replay> {
-    replay_pull(&in_recording(parameters, recording), recording, TOLERANCE).map_err(|error| in_file(recording, error))
+    replay_pull(&in_recording(parameters, recording), recording, Accuracy::USUAL)
+        .map_err(|error| in_file(recording, error))
 }
 
-fn replay_pull(parameters: &Parameters, recording: &Recording, tolerance: f64) -> Result<Replay> {
+fn replay_pull(parameters: &Parameters, recording: &Recording, accuracy: Accuracy) -> Result<Replay> {
     let nothing = || vec![0.0; recording.time.len()];
     let mut pressure = recording.bridged(Signal::GaugePressure).unwrap_or_else(nothing);
     let start = recording.time[0];
@@ -179,7 +180,7 @@ fn replay_pull(parameters: &Parameters, recording: &Recording, tolerance: f64) -
         contraction_velocity: motion.velocity[k],
     };
     let given = [Signal::Contraction, Signal::GaugePressure];
-    follow::<MuscleAlone>(parameters, &recording.time, tolerance, inputs, driven_readings, motion.pull(), &given)
+    follow::<MuscleAlone>(parameters, &recording.time, accuracy, inputs, driven_readings, motion.pull(), &given)
 }
 
 /// Gauge pressure in Pa at the start of a recording.
@@ -317,14 +318,14 @@ fn driven_readings(out: &ActuatorOutputs) -> [f64; 3] {
 fn follow<S: System>(
     parameters: &Parameters,
     time: &[f64],
-    tolerance: f64,
+    accuracy: Accuracy,
     inputs: impl Fn(usize, f64) -> S::Inputs,
     shown: impl Fn(&S::Outputs) -> [f64; 3],
     pull: Option<fn(&S::Outputs) -> f64>,
     given: &[Signal],
 ) -> Result<Replay> {
     let mut simulator = Simulator::<S>::new(*parameters);
-    simulator.tolerance = tolerance;
+    simulator.accuracy = accuracy;
     simulator.inputs = inputs(0, 0.0);
     // What settles counts from the start of the recording.
     simulator.initialize(0.0)?;
@@ -550,7 +551,7 @@ mod tests {
         let command = command(60);
         let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
-        follow::<PneumaticMuscle>(parameters, &time(), TOLERANCE, inputs, shown, None, &[]).unwrap()
+        follow::<PneumaticMuscle>(parameters, &time(), Accuracy::USUAL, inputs, shown, None, &[]).unwrap()
     }
 
     #[test]

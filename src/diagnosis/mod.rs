@@ -25,6 +25,7 @@ pub use remaining::Remaining;
 pub use residuals::HeldOut;
 
 use crate::Result;
+use crate::integrator::Accuracy;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality;
@@ -45,9 +46,10 @@ pub const DEFAULT_TOLERANCE: f64 = 0.03;
 const PERIODS: (f64, f64) = (5e-3, 1e-2);
 const MANY_SAMPLES: f64 = 13e3;
 
-/// Tolerance of the integration in fits: ten times this is far below all noise, too, but makes derivatives by differences so rough that
-/// fits of dry friction get stuck; with [`crate::integrator::TOLERANCE`] it takes half as long again.
-const INTEGRATION: f64 = 1e-7;
+/// Accuracy of the integration in fits. Ten times the tolerance is far below all noise, too, but makes derivatives by differences so rough
+/// that fits of dry friction get stuck; with [`Accuracy::USUAL`] it takes half as long again. A stiff start of dry friction takes some
+/// thousand steps a second; a cable beside such friction took a million, and minutes, where nothing came of it.
+const INTEGRATION: Accuracy = Accuracy { tolerance: 1e-7, most_steps: 3e4 };
 
 /// What the recordings say of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -1,7 +1,7 @@
 //! Residuals of a model against recordings: how large they are, what noise alone would leave, which of them no fit sees.
 
 use super::noise::{self, Noise};
-use crate::integrator;
+use crate::integrator::Accuracy;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality::correlation;
@@ -56,8 +56,8 @@ pub struct Data<'a> {
     by_start: Vec<f64>,
     /// Relative error of the nominal coefficients below which nothing is called wrong.
     pub tolerance: f64,
-    /// Tolerance of the integration, see [`integrator::advance`].
-    pub integration: f64,
+    /// Accuracy of the integration.
+    pub integration: Accuracy,
     /// Per recording, what the models did there that were simulated last; see [`replay_remembering`].
     courses: Vec<Recent<Replay>>,
 }
@@ -147,7 +147,7 @@ impl<'a> Data<'a> {
             mistimed: Vec::new(),
             by_start: Vec::new(),
             tolerance,
-            integration: integrator::TOLERANCE,
+            integration: Accuracy::USUAL,
             courses: recordings.iter().map(|_| Recent::new(KEPT_COURSES)).collect(),
         };
         let judged: Vec<Signal> = data.signals().into_iter().filter(|signal| data.is_judged(*signal)).collect();
