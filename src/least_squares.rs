@@ -184,19 +184,20 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
 
     /// Goes on from a place for as long as steps do what derivatives promise, which are fresh there and then updated; whether that is the end.
     fn follow(&self, columns: &mut [Vec<f64>], from: &mut Place, damping: &mut f64, small_decrease: f64) -> bool {
-        let mut trials = TRIALS;
+        let mut are_fresh = true;
         loop {
             let (normal, gradient) = self.normal_equations(columns, from);
             let least = small_decrease * from.cost;
+            let trials = if are_fresh { TRIALS } else { 1 };
             let (better, expected) = match self.better(&normal, &gradient, from, damping, least, trials) {
                 Next::Better(place, expected) => (place, expected),
-                Next::Worse if trials < TRIALS => return false,
-                Next::Worse | Next::NotWorth => return true,
+                Next::Worse => return are_fresh,
+                Next::NotWorth => return true,
             };
             let before = std::mem::replace(from, better);
             let decrease = before.cost - from.cost;
             let are_good = (decrease / expected - 1.0).abs() < SURPRISE;
-            if decrease <= least && (trials == TRIALS || are_good) {
+            if decrease <= least && (are_fresh || are_good) {
                 return true;
             }
             let step = self.step_between(&before.parameters, &from.parameters);
@@ -204,7 +205,7 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>> + Sync> Problem<'_, R> {
             if !are_good {
                 return false;
             }
-            trials = 1;
+            are_fresh = false;
         }
     }
 

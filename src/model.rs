@@ -756,6 +756,7 @@ mod tests {
         let (mut all, mut moving) = (start, start);
         let (mut step_of_all, mut step_of_moving) = (1e-3, 1e-3);
         let mut instants = [Vec::new(), Vec::new()];
+        let accuracy = Accuracy { tolerance: 1e-8, ..Accuracy::USUAL };
         for _ in 0..20 {
             let scale = Extended([1.0; 14]);
             let [of_all, of_moving] = &mut instants;
@@ -763,10 +764,10 @@ mod tests {
                 seen.push(within(0.5 * t1).0);
             };
             let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_all, t1, within);
-            all.advance(u64::MAX >> 2, rates, witness, &scale, Accuracy::USUAL, &mut step_of_all, 0.1).unwrap();
+            all.advance(u64::MAX >> 2, rates, witness, &scale, accuracy, &mut step_of_all, 0.1).unwrap();
             let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_moving, t1, within);
             let moves = 1 << 2 | 1 << 11;
-            moving.advance(moves, rates, witness, &scale, Accuracy::USUAL, &mut step_of_moving, 0.1).unwrap();
+            moving.advance(moves, rates, witness, &scale, accuracy, &mut step_of_moving, 0.1).unwrap();
         }
         assert_eq!((all, step_of_all, &instants[0]), (moving, step_of_moving, &instants[1]));
         assert!(all.0[13] != start.0[13] && all.0[12] == start.0[12] && !instants[0].is_empty());

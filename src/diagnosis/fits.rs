@@ -609,6 +609,11 @@ fn weighted(residuals: &[f64], weights: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::{INTEGRATION, thinned};
+    use crate::effects::Effects;
+    use crate::measurement::read_all;
+    use crate::simulation::replay_within;
+    use std::path::Path;
 
     #[test]
     fn a_change_counts_in_the_blocks_that_it_makes_better() {
@@ -616,6 +621,25 @@ mod tests {
         // The second block would be worse by 0.16, though one of its residuals gets smaller; the third no better and no worse.
         forgive(&mut change, &[1.0, 1.0, 0.1, 1.0, 0.0, -1.0], (vec![0, 0, 1, 1, 2, 2], 3));
         assert_eq!(change, [-1.0, -1.5, 0.0, 0.0, 0.0, 2.0]);
+    }
+
+    #[test]
+    fn every_start_of_every_effect_is_simulated_in_time() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
+        let files = ["prescribed_motion.csv", "dry_friction_20kg.csv"].map(|name| folder.join(name));
+        let recordings = thinned(&read_all(&files, &[]).unwrap());
+        let mut rubbed = Parameters::default();
+        (rubbed.effects.friction_hysteresis.half_width, rubbed.effects.friction_hysteresis.knee) = (50.0, 2.0);
+        Effects::DESCRIPTIONS.par_iter().for_each(|effect| {
+            let parts = effect.all_forms().enumerate().map(|(form, _)| Part::plain(effect, form));
+            for (part, choice) in parts.flat_map(|part| (0..part.starts()).map(move |choice| (part, choice))) {
+                let model = at_start(&rubbed, part.freed(), choice);
+                for recording in &recordings {
+                    let replayed = replay_within(&model, recording, INTEGRATION);
+                    assert!(replayed.is_ok(), "{} {} {choice}: {replayed:?}", effect.name, part.form);
+                }
+            }
+        });
     }
 
     #[test]

@@ -47,8 +47,8 @@ const PERIODS: (f64, f64) = (5e-3, 1e-2);
 const MANY_SAMPLES: f64 = 13e3;
 
 /// Accuracy of the integration in fits. Ten times the tolerance is far below all noise, too, but makes derivatives by differences so rough
-/// that fits of dry friction get stuck; with [`Accuracy::USUAL`] it takes half as long again. A stiff start of dry friction takes some
-/// thousand steps a second; a cable beside such friction took a million, and minutes, where nothing came of it.
+/// that fits of dry friction get stuck; with [`Accuracy::USUAL`] it takes half as long again. No start of an effect takes as
+/// many steps a second; a cable beside stiff friction took 16 s for one recording, and nothing came of it.
 const INTEGRATION: Accuracy = Accuracy { tolerance: 1e-7, most_steps: 3e4 };
 
 /// What the recordings say of the model.

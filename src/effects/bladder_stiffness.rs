@@ -105,3 +105,19 @@ impl Effect for BladderStiffness {
         format!("The membrane is {how} at 10 cm of contraction.")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn laws_that_cancel_are_no_membrane() {
+        let membrane = |change_with_contraction, added_force| BladderStiffness {
+            change_with_contraction,
+            added_force,
+            ..BladderStiffness::default()
+        };
+        assert!([(0.3, 0.0), (0.3, 100.0), (-0.3, -100.0), (0.05, -100.0)].into_iter().all(|(c, f)| membrane(c, f).is_plausible()));
+        assert!(![(0.3, -100.0), (-0.3, 100.0)].into_iter().any(|(c, f)| membrane(c, f).is_plausible()));
+    }
+}

@@ -187,3 +187,20 @@ impl Effect for FlowLimit {
         format!("The muscle fills {} and empties {}.", say(self.filling), say(self.emptying))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_goes_with_the_missing_pressure_is_a_lag() {
+        let hose = |exponent| FlowLimit { filling: 1e5, emptying: 1e5, roundness: 1.0, exponent, ..FlowLimit::default() };
+        assert!(hose(0.0).is_plausible() && hose(0.57).is_plausible() && !hose(1.0).is_plausible());
+        // r/(1 + r/(m e)) with r = w e is in proportion to the error e.
+        let rate_at = |missing: f64| {
+            let at = Point { target_pressure: 2e5 + missing, gauge_pressure: 2e5, ..Point::default() };
+            hose(1.0).limited(&at, 15.0 * missing)
+        };
+        assert!((rate_at(1e5) / rate_at(1e4) - 10.0).abs() < 1e-2);
+    }
+}

@@ -341,8 +341,8 @@ impl<'a> Search<'a> {
             (&bases[..], not_carried_on(level, &bases))
         };
         let mut next = self.extended(level, first);
-        let is_worth = |more: &Judged| possible(level).is_some_and(|fewer| self.is_worth(fewer, more));
-        let is_missed = if is_form_alone { !next.iter().any(is_worth) } else { next.is_empty() };
+        let is_missed =
+            if is_form_alone { !next.iter().any(|more| self.is_worth_more(level, more)) } else { next.is_empty() };
         if is_missed && effects_of(level) == 1 {
             next.extend(self.extended(level, &others));
             next = each_once(next);
@@ -380,7 +380,7 @@ impl<'a> Search<'a> {
         let Some((last, earlier)) = parts.split_last() else { return Vec::new() };
         let bases: Vec<(Part, Fitted)> = if leaves_much {
             earlier.iter().copied().filter_map(without).chain(beside(*last)).collect()
-        } else if possible(level).is_some_and(|fewer| self.is_worth(fewer, best)) {
+        } else if self.is_worth_more(level, best) {
             parts.iter().copied().filter_map(beside).collect()
         } else {
             Vec::new()
@@ -442,6 +442,11 @@ impl<'a> Search<'a> {
         evidence(&fewer.fitted, &more.fitted) > LEAST_EVIDENCE
             && self.further(fewer, more) > share
             && takes_off(&fewer.fitted.losses, &more.fitted.losses, &self.bench.data, variance)
+    }
+
+    /// Whether a hypothesis is worth more effects than those of a level.
+    fn is_worth_more(&self, level: &[Judged], more: &Judged) -> bool {
+        possible(level).is_some_and(|fewer| self.is_worth(fewer, more))
     }
 
     /// Whether what an effect takes off the error of some signal is more than the structural error of a sound model:
