@@ -117,7 +117,11 @@ mod tests {
             added_force,
             ..BladderStiffness::default()
         };
-        assert!([(0.3, 0.0), (0.3, 100.0), (-0.3, -100.0), (0.05, -100.0)].into_iter().all(|(c, f)| membrane(c, f).is_plausible()));
+        assert!(
+            [(0.3, 0.0), (0.3, 100.0), (-0.3, -100.0), (0.05, -100.0)]
+                .into_iter()
+                .all(|(c, f)| membrane(c, f).is_plausible())
+        );
         assert!(![(0.3, -100.0), (-0.3, 100.0)].into_iter().any(|(c, f)| membrane(c, f).is_plausible()));
     }
 }

@@ -194,7 +194,8 @@ mod tests {
 
     #[test]
     fn what_goes_with_the_missing_pressure_is_a_lag() {
-        let hose = |exponent| FlowLimit { filling: 1e5, emptying: 1e5, roundness: 1.0, exponent, ..FlowLimit::default() };
+        let hose =
+            |exponent| FlowLimit { filling: 1e5, emptying: 1e5, roundness: 1.0, exponent, ..FlowLimit::default() };
         assert!(hose(0.0).is_plausible() && hose(0.57).is_plausible() && !hose(1.0).is_plausible());
         // r/(1 + r/(m e)) with r = w e is in proportion to the error e.
         let rate_at = |missing: f64| {

@@ -155,7 +155,11 @@ impl Effect for ValveLag {
     fn sentence(&self) -> String {
         let mut longer = format!("its time constant is {:.0} ms longer", 1e3 * self.time_constant);
         if self.excess_near_target > 0.0 {
-            let _ = write!(longer, ", {:.0} ms near its target", 1e3 * self.time_constant * (1.0 + self.excess_near_target));
+            let _ = write!(
+                longer,
+                ", {:.0} ms near its target",
+                1e3 * self.time_constant * (1.0 + self.excess_near_target)
+            );
         }
         let before =
             |what: &str, time: f64| format!("a {what} delay of first order, {:.0} ms, comes before it", 1e3 * time);
