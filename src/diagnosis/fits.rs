@@ -356,13 +356,25 @@ impl<'a> Bench<'a> {
         let weights = self.data.weights_beside_structure();
         // What cannot be simulated is worth nothing.
         let Some(slopes) = self.slopes_at(&Hypothesis::default(), &fitted.parameters) else { return f64::INFINITY };
-        let expected = self.corrections.iter().zip(slopes.by).filter_map(|((variable, correction), slope)| {
-            let (mean, deviation) = correction.prior?;
-            let off = (declared(&fitted.parameters, variable.name).1 - mean) / deviation;
-            Some((off, weighted(&slope, &weights).into_iter().map(|slope| slope * deviation).collect()))
+        let columns = self.corrections.iter().zip(slopes.by).filter_map(|((_, correction), slope)| {
+            let (_, deviation) = correction.prior?;
+            Some(weighted(&slope, &weights).into_iter().map(|slope| slope * deviation).collect())
         });
-        let (off, columns): (Vec<f64>, Vec<Vec<f64>>) = expected.unzip();
-        price(&off, &columns)
+        price(&self.off(fitted), &columns.collect::<Vec<_>>())
+    }
+
+    /// By how much the corrections of a fit are less likely than none, in natural logarithm, before the data are looked at.
+    pub fn strain(&self, fitted: &Fitted) -> f64 {
+        half_squares(&self.off(fitted))
+    }
+
+    /// How far the corrections of a fit are from what was expected, in its standard deviations.
+    fn off(&self, fitted: &Fitted) -> Vec<f64> {
+        let off = self.corrections.iter().filter_map(|(variable, correction)| {
+            let (mean, deviation) = correction.prior?;
+            Some((declared(&fitted.parameters, variable.name).1 - mean) / deviation)
+        });
+        off.collect()
     }
 
     /// What the parameters of a fit, corrections among them, do to its residuals; `None` where it cannot be simulated.
@@ -594,7 +606,11 @@ fn price(off: &[f64], columns: &[Vec<f64>]) -> f64 {
     let known = normal_matrix(columns) + DMatrix::identity(columns.len(), columns.len());
     // Of a positive definite matrix; its determinant is the squared product of the factor's diagonal.
     let precision: f64 = known.cholesky().map_or(0.0, |factor| factor.l().diagonal().iter().map(|d| d.ln()).sum());
-    0.5 * off.iter().map(|off| off * off).sum::<f64>() + precision
+    half_squares(off) + precision
+}
+
+fn half_squares(off: &[f64]) -> f64 {
+    0.5 * off.iter().map(|off| off * off).sum::<f64>()
 }
 
 /// Sum of weighted squares.

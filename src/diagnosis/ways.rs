@@ -129,11 +129,12 @@ impl<'a> Found<'a> {
 
     /// How many causes are worth looking for where the coefficients may be off in a way that allows more: where this says all, fewer causes
     /// than here, but a single one that may be another; where no second one explains a good part of what one leaves, hardly does it there.
+    /// Where coefficients would have to be off here as they hardly are, causes may stand for what they are.
     fn most_beside(&self) -> usize {
         match self.best().causes() {
             _ if self.search.ends_at_one() => 1,
             0 => MOST_EFFECTS,
-            _ if !self.best().says_all() => MOST_EFFECTS,
+            _ if !self.best().says_all() || self.best().strain() > LEAST_EVIDENCE => MOST_EFFECTS,
             causes => (causes - 1).max(1),
         }
     }
@@ -175,6 +176,11 @@ impl Best<'_, '_> {
             0 | 1 => !is_unsound(&self.fitted.losses, self.data()),
             _ => may_be_form(&self.search.baseline.losses, &self.fitted.losses, self.data()),
         }
+    }
+
+    /// How unlikely the coefficients are that it takes, in natural logarithm.
+    fn strain(&self) -> f64 {
+        self.search.bench.strain(self.fitted)
     }
 
     /// Whether its causes are better than what was found where the coefficients may be off in a way that allows more. Each cause more must be

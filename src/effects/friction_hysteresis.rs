@@ -1,6 +1,6 @@
 use super::{Description, Effect, Holds, Point, REFERENCE_CONTRACTION, REFERENCE_FORCE, of_recording};
 
-/// Smallest velocity in m/s over which a friction without a loop changes its sign.
+/// Smallest velocity in m/s over which a friction without a loop changes its sign, which fits approach without ever losing sight of it.
 const LEAST_SMOOTHING: f64 = 2e-4;
 
 /// Share of a friction without a loop with which it starts at most: what is nearer to all of it is a matter of high speeds.
@@ -25,7 +25,7 @@ crate::variables::variables! {
     /// # Validity
     /// Smooth loops, as of FESTO muscles whose threads are embedded in rubber. With the Stribeck term the load may creep
     /// in jerks, but it never sticks for good; with v₀ it sinks slowly where it should stick.
-    /// v₀ acts as 0.2 mm/s where it is less, so that no step of the integration becomes too short.
+    /// v₀ acts as √(v₀² + (0.2 mm/s)²), so that no step of the integration becomes too short.
     ///
     /// # Reference
     /// P. Dahl (1968), A solid friction model, TOR-0158(3107-18)-1; Y. Wen (1976), Method for random vibration of
@@ -96,7 +96,7 @@ impl FrictionHysteresis {
 
     /// Velocity in m/s within which it sets in, where it goes by velocity.
     fn smoothing(&self) -> f64 {
-        self.smoothing_velocity.max(LEAST_SMOOTHING)
+        self.smoothing_velocity.hypot(LEAST_SMOOTHING)
     }
 
     /// Share of the half width that acts, with its sign.

@@ -75,6 +75,15 @@ pub(crate) fn of_recording(number: f64, [second, third]: [f64; 2]) -> f64 {
     }
 }
 
+/// Leaves out of an effect what makes no difference to one of several recordings, by its number from 1.
+fn leave_out_others(effect: &mut impl Declared, number: usize) {
+    effect.visit_mut(&mut |variable, old| match variable {
+        _ if variable.name.ends_with(".recording") => number as f64,
+        _ if variable.is_felt_in(number) => old,
+        _ => 0.0,
+    });
+}
+
 /// What is told of a second and a third recording where their values are not zero, by `told` from a value and the recording's name.
 pub(crate) fn told_anew(values: [f64; 2], told: impl Fn(f64, &str) -> String) -> String {
     let named = values.into_iter().zip(["second", "third"]).filter(|(value, _)| *value != 0.0);
@@ -188,11 +197,7 @@ pub trait Effect: Declared + Default {
     }
     /// Has it be as it is in one of several recordings, by its number from 1, without what makes no difference to that one.
     fn in_recording(&mut self, number: usize) {
-        self.visit_mut(&mut |variable, old| match variable {
-            _ if variable.name.ends_with(".recording") => number as f64,
-            _ if variable.is_felt_in(number) => old,
-            _ => 0.0,
-        });
+        leave_out_others(self, number);
     }
     /// By how much later in s the valve answers on average than one of first order with a bandwidth in rad/s.
     fn lateness(&self, _bandwidth: f64) -> f64 {

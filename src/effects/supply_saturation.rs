@@ -1,4 +1,4 @@
-use super::{Description, Effect, Freed, Holds, Point, each_for, of_recording, told_anew};
+use super::{Description, Effect, Freed, Holds, Point, each_for, leave_out_others, of_recording, told_anew};
 
 /// Ceiling in Pa from which on there is none: beyond what any muscle stands.
 const NONE: f64 = 2e6;
@@ -84,10 +84,19 @@ const SPAN: Freed = ("supply_saturation.span", &[2e4]);
 const REFILL: Freed = ("supply_saturation.refill", &[0.2]);
 
 impl SupplySaturation {
+    /// Gauge pressure in Pa of the supply in the recording that is simulated, in the mean.
+    fn given(&self) -> f64 {
+        self.gauge_pressure + of_recording(self.recording, [self.second, self.third])
+    }
+
+    /// Share of a compressor's period that is over at the start of that.
+    fn phase_at_start(&self) -> f64 {
+        self.phase + of_recording(self.recording, [self.second_phase, self.third_phase])
+    }
+
     /// What a compressor's switching takes off the supply at a time in s since the start, Pa.
     fn cycle(&self, time: f64) -> f64 {
-        let phase = self.phase + of_recording(self.recording, [self.second_phase, self.third_phase]);
-        let passed = (time / self.period + phase).rem_euclid(1.0);
+        let passed = (time / self.period + self.phase_at_start()).rem_euclid(1.0);
         let emptying = 1.0 - self.refill;
         self.span * (if passed < emptying { passed / emptying } else { (1.0 - passed) / self.refill } - 0.5)
     }
@@ -163,6 +172,16 @@ impl Effect for SupplySaturation {
         self.is_neutral() || [self.fall, self.usage, self.span] == [0.0; 3]
     }
 
+    // The same supply whichever recording it is of: hundreds of starts for several recordings are few for each.
+    fn in_recording(&mut self, number: usize) {
+        leave_out_others(self, number);
+        if self.is_neutral() {
+            return;
+        }
+        (self.gauge_pressure, self.phase) = (self.given(), self.phase_at_start());
+        [self.second, self.third, self.second_phase, self.third_phase] = [0.0; 4];
+    }
+
     fn own_course(&self, time: f64) -> f64 {
         -self.cycle(time)
     }
@@ -178,8 +197,7 @@ impl Effect for SupplySaturation {
             return target;
         }
         let lost = own[0] + self.cycle(own[1]);
-        let given = self.gauge_pressure + of_recording(self.recording, [self.second, self.third]);
-        let ceiling = given - lost - self.droop * (target - at.gauge_pressure).max(0.0);
+        let ceiling = self.given() - lost - self.droop * (target - at.gauge_pressure).max(0.0);
         if self.sharpness == 0.0 || target <= 0.0 || ceiling <= 0.0 {
             return target.min(ceiling);
         }

@@ -86,7 +86,8 @@ class Score:
             *share("one effect: first cause right", self.single, lambda o: o.first_right),
             *share("one effect: first cause wrong", self.single, is_wrong),
             *share("one effect: called nominal", self.single, lambda o: o.verdict == "nominal"),
-            *([Measure("one effect: macro-F1", f"{self.macro_f1():.3f}")] if self.single else []),
+            *self.of_macro_f1("one effect: macro-F1", self.single),
+            *self.of_macro_f1("one effect that shows: macro-F1", visible),
         ]
 
     def of_forms(self):
@@ -155,17 +156,17 @@ class Score:
         seconds = [o.seconds for o in self.outcomes]
         return [Measure("time per case", f"{np.median(seconds):.1f} s median, {max(seconds):.1f} s longest")]
 
-    def macro_f1(self):
+    def of_macro_f1(self, title, single):
         """Mean over the effects of the library that were hidden alone; a set of two with the truth counts as the truth.
 
         False alarms on sound muscles and names for what is in no library count against the name that was given.
         """
-        pairs = [(o.truth, label(o)) for o in self.single + self.sound + self.foreign]
+        pairs = [(o.truth, label(o)) for o in single + self.sound + self.foreign]
         scores = []
-        for effect in {o.truth for o in self.single}:
+        for effect in {o.truth for o in single}:
             hits = sum(pair == (effect, effect) for pair in pairs)
             scores.append(2 * hits / sum((truth == effect) + (answer == effect) for truth, answer in pairs))
-        return np.mean(scores)
+        return [Measure(title, f"{np.mean(scores):.3f}")] if scores else []
 
     def is_right(self, o):
         if not o.truths:

@@ -766,17 +766,20 @@ class Friction(Plant):
         return super().force(pressure, x, velocity, own) - stribeck
 
 
+SMOOTHING = np.hypot(2e-3, 2e-4)
+
+
 class DirectFriction(Plant):
     """Coulomb's law without a memory, its step rounded."""
 
     def force(self, pressure, x, velocity, own):
-        return super().force(pressure, x, velocity, own) - (9 + 8e-5 * pressure) * np.tanh(velocity / 2e-3)
+        return super().force(pressure, x, velocity, own) - (9 + 8e-5 * pressure) * np.tanh(velocity / SMOOTHING)
 
 
 class SinkingFriction(DirectFriction):
     """The same of a load that still sinks at the start, held by 60 % of the friction."""
 
-    start_velocity = 2e-3 * np.arctanh(-0.6)
+    start_velocity = SMOOTHING * np.arctanh(-0.6)
 
 
 class CordFriction(Plant):
@@ -784,7 +787,7 @@ class CordFriction(Plant):
 
     def force(self, pressure, x, velocity, own):
         pull = super().force(pressure, x, velocity, own)
-        return pull - (9 + 0.04 * abs(pull)) * (1 - 0.6 * (x / 0.1 - 1)) * np.tanh(velocity / 2e-3)
+        return pull - (9 + 0.04 * abs(pull)) * (1 - 0.6 * (x / 0.1 - 1)) * np.tanh(velocity / SMOOTHING)
 
 
 class ThinningDamping(Plant):
