@@ -171,10 +171,6 @@ pub fn diagnose(
     let prepared = |off: &Off| {
         let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
         for_fits.integration = INTEGRATION;
-        // A nominal model that takes more steps itself has its reasons.
-        if for_fits.replays(nominal).is_none() {
-            for_fits.integration.most_steps = f64::INFINITY;
-        }
         for_fits.doubt_starts(nominal);
         let bench = Bench::new(for_fits, nominal, tolerance, *off, &changes);
         Way::new(bench, *off == Off::most(nominal)).ok_or_else(cannot_follow)

@@ -96,7 +96,8 @@ impl FrictionHysteresis {
 
     /// Velocity in m/s within which it sets in, where it goes by velocity.
     fn smoothing(&self) -> f64 {
-        self.smoothing_velocity.hypot(LEAST_SMOOTHING)
+        // No `hypot`, which asks for a newer C library than all else does.
+        (self.smoothing_velocity.powi(2) + LEAST_SMOOTHING.powi(2)).sqrt()
     }
 
     /// Share of the half width that acts, with its sign.
