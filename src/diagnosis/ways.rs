@@ -134,7 +134,7 @@ impl<'a> Found<'a> {
         match self.best().causes() {
             _ if self.search.ends_at_one() => 1,
             0 => MOST_EFFECTS,
-            _ if !self.best().says_all() || self.best().strain() > LEAST_EVIDENCE => MOST_EFFECTS,
+            _ if !self.best().says_all() || self.bench().strain(&self.chosen.best) > LEAST_EVIDENCE => MOST_EFFECTS,
             causes => (causes - 1).max(1),
         }
     }
@@ -176,11 +176,6 @@ impl Best<'_, '_> {
             0 | 1 => !is_unsound(&self.fitted.losses, self.data()),
             _ => may_be_form(&self.search.baseline.losses, &self.fitted.losses, self.data()),
         }
-    }
-
-    /// How unlikely the coefficients are that it takes, in natural logarithm.
-    fn strain(&self) -> f64 {
-        self.search.bench.strain(self.fitted)
     }
 
     /// Whether its causes are better than what was found where the coefficients may be off in a way that allows more. Each cause more must be

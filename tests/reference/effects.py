@@ -766,6 +766,7 @@ class Friction(Plant):
         return super().force(pressure, x, velocity, own) - stribeck
 
 
+# A smoothing velocity of 2 mm/s acts beside the least one of 0.2 mm/s.
 SMOOTHING = np.hypot(2e-3, 2e-4)
 
 
