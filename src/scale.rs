@@ -2,6 +2,9 @@
 
 use std::fmt::Write;
 
+/// Steps of Newton's method to the value behind a reading, which is nearly straight.
+const NEWTON_STEPS: usize = 4;
+
 /// By how much a scale is off, over its values and over time.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Scale {
@@ -26,11 +29,22 @@ impl Scale {
         value * (1.0 + self.relative_error + of_value + settled(self.settling, time))
     }
 
-    /// The value behind a reading at a time in s since the start: the root of a quadratic that is near to the reading. A curvature is not
-    /// undone.
+    /// The value behind a reading at a time in s since the start: without a curvature the root of a quadratic that is near to the reading, with one
+    /// found from there by Newton's method.
     pub fn behind(&self, reading: f64, time: f64) -> f64 {
         let slope = 1.0 + self.relative_error + settled(self.settling, time) - self.bend;
-        2.0 * reading / (slope + (slope * slope + 4.0 * self.bend / self.middle * reading).max(0.0).sqrt())
+        let value = 2.0 * reading / (slope + (slope * slope + 4.0 * self.bend / self.middle * reading).max(0.0).sqrt());
+        if self.curvature == 0.0 {
+            return value;
+        }
+        (0..NEWTON_STEPS).fold(value, |value, _| value - (self.shown(value, time) - reading) / self.slope(value, time))
+    }
+
+    /// Change of what is shown with the value.
+    fn slope(&self, value: f64, time: f64) -> f64 {
+        let ratio = value / self.middle;
+        let of_value = self.bend * (2.0 * ratio - 1.0) + self.curvature * (3.0 * ratio.powi(2) - 1.0);
+        1.0 + self.relative_error + of_value + settled(self.settling, time)
     }
 
     /// Whether it is always right.
@@ -104,9 +118,11 @@ mod tests {
 
     #[test]
     fn what_is_behind_a_reading_shows_it() {
-        let scale = Scale { middle: 0.1, relative_error: 0.04, bend: -0.03, settling: (0.05, 2.0), curvature: 0.0 };
-        for (value, time) in [(0.0, 0.0), (0.07, 0.5), (0.21, 30.0)] {
-            assert!((scale.behind(scale.shown(value, time), time) - value).abs() < 1e-15);
+        let bent = Scale { middle: 0.1, relative_error: 0.04, bend: -0.03, settling: (0.05, 2.0), curvature: 0.0 };
+        for scale in [bent, Scale { curvature: 0.03, ..bent }, Scale { curvature: -0.02, ..bent }] {
+            for (value, time) in [(0.0, 0.0), (0.07, 0.5), (0.21, 30.0)] {
+                assert!((scale.behind(scale.shown(value, time), time) - value).abs() < 1e-15, "{scale:?} {value}");
+            }
         }
     }
 }

@@ -84,7 +84,8 @@ pub fn better<'a>(
         found.up_to(most);
         other.up_to(found.most_beside());
     }
-    Ok(Some(if found.best().beats(&other.best()) { found } else { other }))
+    let wins = found.best().beats(&other.best()) && other.refused().is_none_or(|refused| found.best().beats(&refused));
+    Ok(Some(if wins { found } else { other }))
 }
 
 /// Whether the single effect that looks best beats the one of a way that allows more, where that one leaves nothing, and neither does the
@@ -120,6 +121,11 @@ impl<'a> Found<'a> {
     /// Its best fit to all samples.
     fn best(&self) -> Best<'_, 'a> {
         Best { search: &self.search, fitted: &self.chosen.best }
+    }
+
+    /// What leads, where it is refused a name.
+    fn refused(&self) -> Option<Best<'_, 'a>> {
+        Some(Best { search: &self.search, fitted: self.chosen.refused.as_ref()? })
     }
 
     /// Whether nothing is wrong, so that nothing can be where the coefficients may be off in a way that allows more.

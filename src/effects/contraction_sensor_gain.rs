@@ -5,8 +5,8 @@ crate::variables::variables! {
     /// A position sensor whose scale is off.
     ///
     /// # Model
-    /// x_measured ← x_measured (1 + g + b (x_measured/0.1 m − 1) + s exp(−t/τ)), t since the start: `relative_error` g, `bend` b,
-    /// `settling` s, `settling_time` τ.
+    /// x_measured ← x_measured (1 + g + b (r − 1) + c (r² − 1) + s exp(−t/τ)), r = x_measured/0.1 m, t since the start: `relative_error` g,
+    /// `bend` b, `curvature` c, `settling` s, `settling_time` τ.
     ///
     /// # In the data
     /// The residual of the contraction is in proportion to the contraction; the force is as it should be for the true one.
@@ -21,6 +21,8 @@ crate::variables::variables! {
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Change of the scale per 0.1 m away from 0.1 m
         bend: f64 = 0.0, ONE, (-0.1..=0.1);
+        /// Change of the scale with the square of the way, per that of 0.1 m
+        curvature: f64 = 0.0, ONE, (-0.03..=0.03);
         /// Excess of the scale at the start, which settles
         settling: f64 = 0.0, ONE, (-0.3..=0.3);
         /// Time constant of the settling
@@ -32,14 +34,8 @@ impl ContractionSensorGain {
     forms_of_scale!("contraction_sensor_gain.");
 
     fn scale(&self) -> Scale {
-        let Self { relative_error, bend, settling, settling_time } = *self;
-        Scale {
-            middle: REFERENCE_CONTRACTION,
-            relative_error,
-            bend,
-            curvature: 0.0,
-            settling: (settling, settling_time),
-        }
+        let Self { relative_error, bend, curvature, settling, settling_time } = *self;
+        Scale { middle: REFERENCE_CONTRACTION, relative_error, bend, curvature, settling: (settling, settling_time) }
     }
 }
 
@@ -47,7 +43,7 @@ impl Effect for ContractionSensorGain {
     const DESCRIPTION: Description = Description {
         name: "contraction_sensor_gain",
         meaning: "the scale of the position sensor is off",
-        equation: "x_measured <- x_measured (1 + g + b (x_measured/0.1 m - 1) + s exp(-t/tau))",
+        equation: "x_measured <- x_measured (1 + g + b (r - 1) + c (r^2 - 1) + s exp(-t/tau)), r = x_measured/0.1 m",
         signature: "residual of the contraction in proportion to it",
         experiment: "compare with a ruler at two lengths",
         reference: "definition",
@@ -55,10 +51,14 @@ impl Effect for ContractionSensorGain {
         holds: Holds::Exactly,
         forms: Self::FORMS,
         further_forms: Self::FURTHER_FORMS,
-        refinements: &[("contraction_sensor_gain.bend", &[0.005])],
+        refinements: &[("contraction_sensor_gain.bend", &[0.005]), ("contraction_sensor_gain.curvature", &[0.002])],
     };
-    const ENDS_INSIDE: &'static [&'static str] =
-        &["contraction_sensor_gain.bend", "contraction_sensor_gain.settling", "contraction_sensor_gain.settling_time"];
+    const ENDS_INSIDE: &'static [&'static str] = &[
+        "contraction_sensor_gain.bend",
+        "contraction_sensor_gain.curvature",
+        "contraction_sensor_gain.settling",
+        "contraction_sensor_gain.settling_time",
+    ];
     const IS_OF_READING: bool = true;
 
     as_its_scale!();

@@ -45,7 +45,12 @@ impl Effect for PayloadMass {
         reference: "thesis eq. 5.4",
         of_load: true,
         holds: Holds::Exactly,
-        forms: &[&[("payload_mass.additional_mass", &[2.0, -2.0])], &[("payload_mass.relative_error", &[0.1, -0.1])]],
+        forms: &[
+            &[("payload_mass.additional_mass", &[2.0, -2.0])],
+            &[("payload_mass.relative_error", &[0.1, -0.1])],
+            // A pulley that was not thought of.
+            &[("payload_mass.inertia", &[5.0, -2.0])],
+        ],
         further_forms: &[
             &[("payload_mass.additional_mass", &[0.5]), ("payload_mass.per_length", &[20.0, -20.0])],
             &[("payload_mass.additional_mass", &[0.5]), ("payload_mass.second", &[2.0, -2.0])],
@@ -85,6 +90,9 @@ impl Effect for PayloadMass {
             format!(", {:+.2} kg in the {recording} recording", mass + own)
         });
         let lifted = if_any(self.per_length, format!(", {:+.1} kg per metre that it is lifted", self.per_length));
+        if [percent, mass] == [0.0; 2] && self.inertia != 0.0 {
+            return format!("The load weighs what was entered{anew}{lifted}{inertia}.");
+        }
         if percent == 0.0 {
             return format!("The load is {:.2} kg {} than entered{anew}{lifted}{inertia}.", mass.abs(), word(mass));
         }

@@ -5,8 +5,8 @@ crate::variables::variables! {
     /// A pressure sensor whose scale is off.
     ///
     /// # Model
-    /// p_measured ← p_measured (1 + g + b (p_measured/2 bar − 1) + s exp(−t/τ)), t since the start: `relative_error` g, `bend` b,
-    /// `settling` s, `settling_time` τ.
+    /// p_measured ← p_measured (1 + g + b (r − 1) + c (r² − 1) + s exp(−t/τ)), r = p_measured/2 bar, t since the start: `relative_error` g,
+    /// `bend` b, `curvature` c, `settling` s, `settling_time` τ.
     ///
     /// # In the data
     /// The residual of the pressure is in proportion to the pressure with a force that fits the command; with a gain of the
@@ -22,6 +22,8 @@ crate::variables::variables! {
         relative_error: f64 = 0.0, ONE, (-0.5..=0.5);
         /// Change of the scale per 2 bar away from 2 bar
         bend: f64 = 0.0, ONE, (-0.1..=0.1);
+        /// Change of the scale with the square of the pressure, per that of 2 bar
+        curvature: f64 = 0.0, ONE, (-0.03..=0.03);
         /// Excess of the scale at the start, which settles
         settling: f64 = 0.0, ONE, (-0.3..=0.3);
         /// Time constant of the settling
@@ -33,8 +35,8 @@ impl PressureSensorGain {
     forms_of_scale!("pressure_sensor_gain.");
 
     fn scale(&self) -> Scale {
-        let Self { relative_error, bend, settling, settling_time } = *self;
-        Scale { middle: REFERENCE_PRESSURE, relative_error, bend, curvature: 0.0, settling: (settling, settling_time) }
+        let Self { relative_error, bend, curvature, settling, settling_time } = *self;
+        Scale { middle: REFERENCE_PRESSURE, relative_error, bend, curvature, settling: (settling, settling_time) }
     }
 }
 
@@ -42,7 +44,7 @@ impl Effect for PressureSensorGain {
     const DESCRIPTION: Description = Description {
         name: "pressure_sensor_gain",
         meaning: "the scale of the pressure sensor is off",
-        equation: "p_measured <- p_measured (1 + g + b (p_measured/2 bar - 1) + s exp(-t/tau))",
+        equation: "p_measured <- p_measured (1 + g + b (r - 1) + c (r^2 - 1) + s exp(-t/tau)), r = p_measured/2 bar",
         signature: "residual of the pressure in proportion to it",
         experiment: "compare with a second gauge at two pressures",
         reference: "definition",
@@ -50,10 +52,14 @@ impl Effect for PressureSensorGain {
         holds: Holds::Exactly,
         forms: Self::FORMS,
         further_forms: Self::FURTHER_FORMS,
-        refinements: &[("pressure_sensor_gain.bend", &[0.005])],
+        refinements: &[("pressure_sensor_gain.bend", &[0.005]), ("pressure_sensor_gain.curvature", &[0.002])],
     };
-    const ENDS_INSIDE: &'static [&'static str] =
-        &["pressure_sensor_gain.bend", "pressure_sensor_gain.settling", "pressure_sensor_gain.settling_time"];
+    const ENDS_INSIDE: &'static [&'static str] = &[
+        "pressure_sensor_gain.bend",
+        "pressure_sensor_gain.curvature",
+        "pressure_sensor_gain.settling",
+        "pressure_sensor_gain.settling_time",
+    ];
     const IS_OF_READING: bool = true;
 
     as_its_scale!();

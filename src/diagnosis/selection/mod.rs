@@ -73,6 +73,8 @@ pub struct Chosen {
     pub saw_all: bool,
     /// The best fit to all samples, of causes in the library or of one that is in none; that of the baseline where there is no cause.
     pub best: Fitted,
+    /// The hypothesis that leads, where it is refused a name.
+    pub refused: Option<Fitted>,
     /// Per effect of the model, in its order: effects that could stand in its place.
     pub alternatives: Vec<Vec<&'static str>>,
     /// The hypotheses with these effects in their place.

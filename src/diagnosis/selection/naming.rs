@@ -2,7 +2,7 @@
 //! refused, and what explains them as well is told beside it.
 
 use super::evidence::*;
-use super::{Chosen, Judged, LEAST_EVIDENCE, Search, effects_of, is_possible, same_effects};
+use super::{Chosen, Judged, LEAST_EVIDENCE, Search, effects_of, is_possible, same_effects, sorted};
 use crate::diagnosis::fits::Fitted;
 use crate::diagnosis::hypothesis::{Part, declared};
 use crate::diagnosis::residuals::Scope;
@@ -45,7 +45,9 @@ impl Search<'_> {
         };
         match self.as_told(&best) {
             Some(told) => self.named(best, told),
-            None => self.unnamed(self.unlisted_instead_of(&best)),
+            None => {
+                Some(Chosen { refused: Some(best.fitted.clone()), ..self.unnamed(self.unlisted_instead_of(&best))? })
+            }
         }
     }
 
@@ -56,6 +58,7 @@ impl Search<'_> {
         Some(Chosen {
             verdict: if is_nominal { Verdict::Nominal } else { Verdict::Unexplained },
             best: unlisted.map_or(&self.baseline, |unlisted| &unlisted.fitted).clone(),
+            refused: None,
             model: self.bench.exact_fit(hypothesis, parameters, Scope::Training)?,
             saw_all: false,
             alternatives: Vec::new(),
@@ -82,6 +85,7 @@ impl Search<'_> {
             verdict,
             rivals: rivals.into_iter().map(|rival| rival.fitted.clone()).collect(),
             best: best.fitted,
+            refused: None,
             model: told.model,
             saw_all: !told.holds_out,
             alternatives,
@@ -102,8 +106,25 @@ impl Search<'_> {
             return None;
         }
         let are_idle = told.fitted.hypothesis.size() < size;
-        let foretold = self.foretelling(told).or_else(|| if are_idle { self.foretelling(plain) } else { None });
+        let foretold = self.foretelling(told.clone());
+        let foretold = foretold.or_else(|| if are_idle { self.foretelling(plain) } else { None });
+        let foretold = foretold.or_else(|| {
+            let mut fewer = self.one_refinement_fewer(&told).into_iter();
+            fewer.find_map(|fewer| self.foretelling(fewer))
+        });
         foretold.map(|(model, holds_out)| Told { size, model, holds_out })
+    }
+
+    /// A single cause with each of its refinements left out that explains enough so, too, the best first: two that hold a course together among
+    /// the samples that a fit sees may part beyond them.
+    fn one_refinement_fewer(&self, told: &Judged) -> Vec<Judged> {
+        let [part] = told.fitted.hypothesis.parts[..] else { return Vec::new() };
+        let each: Vec<&str> = part.refinements().map(|(name, _)| *name).collect();
+        let fewer = each.into_par_iter().filter_map(|left_out| {
+            let fewer = self.judge(self.bench.less_refined(&told.fitted, |name| name != left_out)?);
+            (is_possible(&fewer) && fewer.explained >= least_explained(&fewer.fitted).0).then_some(fewer)
+        });
+        sorted(fewer.collect())
     }
 
     /// Drops effects that a hypothesis of several can spare and be possible, the most superfluous first: fitted anew without it or, where
