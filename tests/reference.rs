@@ -282,6 +282,10 @@ fn effects_agree_with_scipy() {
             ],
         ),
         (
+            "bent_valve",
+            &[("valve_gain.relative_error", 0.04), ("valve_gain.bend", -0.01), ("valve_gain.curvature", -0.012)],
+        ),
+        (
             "shifting_zero",
             &[
                 ("contraction_sensor_offset.offset", 4e-3),

@@ -104,3 +104,24 @@ impl Effect for ForceSensorGain {
         format!("The force sensor shows {}{tilted}.", self.scale().told("400 N"))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_at_an_angle_shows_its_cosine() {
+        // cos(atan(x/L)) = 1 − x²/(2 L²) + …, here with L = 0.6 m.
+        let cell =
+            ForceSensorGain { change_with_its_square: -0.5 * (0.1_f64 / 0.6).powi(2), ..ForceSensorGain::default() };
+        for contraction in [0.0, 0.05, 0.1, 0.2] {
+            let at = Readings { time: 0.0, contraction, gauge_pressure: 2e5, force: 500.0 };
+            let cosine = (contraction / 0.6).atan().cos();
+            assert!((cell.readings(at).force - 500.0 * cosine).abs() < 3.0, "{contraction}");
+        }
+        assert!(
+            !cell.is_neutral()
+                && cell.sentence().ends_with(", and -1.4 % on top at 10 cm of contraction, as at an angle.")
+        );
+    }
+}

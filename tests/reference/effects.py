@@ -600,6 +600,15 @@ class WarmingScale(Timed):
         return x * (0.95 - 0.03 * np.exp(-own[:, 0] / 2.0))
 
 
+class BentValve(Plant):
+    """4 % more pressure at 2 V, 1 % less for each volt more, and another 3.6 % less at twice that."""
+
+    def rate(self, target, pressure, x, velocity, own):
+        volts = target / VALVE_GAIN
+        gain = 1.04 - 0.01 * (volts - 2) - 0.012 * (volts**2 / 4 - 1)
+        return super().rate(target * gain, pressure, x, velocity, own)
+
+
 class WarmByWork(Plant):
     """Warmed by the power of the pressure's pull; 10 W would make it 2 % stronger for good and the membrane 3 % softer."""
 
@@ -858,6 +867,7 @@ CASES = [
     Case("swinging_zero", SwingingZero(), STAIRS),
     Case("shifting_zero", ShiftingZero(), STAIRS),
     Case("warming_scale", WarmingScale(), STAIRS),
+    Case("bent_valve", BentValve(), RAMPS),
     Case("warm_by_work", WarmByWork(), STAIRS),
     Case("warm_by_way", WarmByWay(), STAIRS),
     Case("warm_coil", WarmCoil(), STAIRS),

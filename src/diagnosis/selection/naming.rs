@@ -41,24 +41,23 @@ struct Told {
 impl Search<'_> {
     pub(super) fn choose(&self) -> Option<Chosen> {
         let Some(best) = self.leading().map(|best| self.assured(self.pruned(best.clone()))) else {
-            return self.unnamed(self.unlisted.as_ref());
+            return self.unnamed(None);
         };
         match self.as_told(&best) {
             Some(told) => self.named(best, told),
-            None => {
-                Some(Chosen { refused: Some(best.fitted.clone()), ..self.unnamed(self.unlisted_instead_of(&best))? })
-            }
+            None => self.unnamed(Some(&best)),
         }
     }
 
-    /// What there is where nothing can be named: a cause in no library, if there is one that does better.
-    fn unnamed(&self, unlisted: Option<&Judged>) -> Option<Chosen> {
+    /// What there is where nothing can be named, be it that what leads is refused: a cause in no library, if there is one that does better.
+    fn unnamed(&self, refused: Option<&Judged>) -> Option<Chosen> {
         let Fitted { hypothesis, parameters, losses, .. } = &self.baseline;
+        let unlisted = refused.map_or(self.unlisted.as_ref(), |refused| self.unlisted_instead_of(refused));
         let is_nominal = unlisted.is_none() && self.is_sound(losses);
         Some(Chosen {
             verdict: if is_nominal { Verdict::Nominal } else { Verdict::Unexplained },
             best: unlisted.map_or(&self.baseline, |unlisted| &unlisted.fitted).clone(),
-            refused: None,
+            refused: refused.map(|refused| refused.fitted.clone()),
             model: self.bench.exact_fit(hypothesis, parameters, Scope::Training)?,
             saw_all: false,
             alternatives: Vec::new(),
