@@ -52,11 +52,16 @@ impl Scale {
         [self.relative_error, self.bend, self.curvature, self.settling.0] == [0.0; 4]
     }
 
+    /// Change of the error from the middle to twice that.
+    pub fn at_twice(&self) -> f64 {
+        self.bend + 3.0 * self.curvature
+    }
+
     /// What a sensor shows at the middle of its range, which is given in words, and what differs from that elsewhere and at the start.
     pub fn told(&self, middle: &str) -> String {
         let word = if self.relative_error < 0.0 { "less" } else { "more" };
         let mut told = format!("{:.1} % {word} than there is", 100.0 * self.relative_error.abs());
-        let at_twice = self.bend + 3.0 * self.curvature;
+        let at_twice = self.at_twice();
         if at_twice != 0.0 {
             let _ = write!(told, " at {middle}, and {:+.1} % on top at twice that", 100.0 * at_twice);
         }
@@ -74,9 +79,20 @@ pub fn settled((excess, constant): (f64, f64), time: f64) -> f64 {
     if excess == 0.0 { 0.0 } else { excess * (-time.max(0.0) / constant).exp() }
 }
 
-/// How fits look for a sensor's scale that is off.
+/// The scale of a sensor with such a middle, and how fits look for it where it is off: `SHAPES` are what must end inside its bounds.
 macro_rules! forms_of_scale {
-    ($prefix:literal) => {
+    ($prefix:literal, $middle:expr) => {
+        fn scale(&self) -> $crate::scale::Scale {
+            let Self { relative_error, bend, curvature, settling, settling_time } = *self;
+            $crate::scale::Scale {
+                middle: $middle,
+                relative_error,
+                bend,
+                curvature,
+                settling: (settling, settling_time),
+            }
+        }
+
         const FORMS: &'static [&'static [$crate::effects::Freed]] = &[
             &[(concat!($prefix, "relative_error"), &[0.05, -0.05])],
             // A gain alone may be what the coefficients of the muscle stand for.
@@ -87,6 +103,14 @@ macro_rules! forms_of_scale {
             (concat!($prefix, "settling"), &[0.02, -0.02, 0.02, -0.02]),
             (concat!($prefix, "settling_time"), &[4.0, 4.0, 15.0, 15.0]),
         ]];
+        const REFINEMENTS: &'static [$crate::effects::Freed] =
+            &[(concat!($prefix, "bend"), &[0.005]), (concat!($prefix, "curvature"), &[0.002])];
+        const SHAPES: &'static [&'static str] = &[
+            concat!($prefix, "bend"),
+            concat!($prefix, "curvature"),
+            concat!($prefix, "settling"),
+            concat!($prefix, "settling_time"),
+        ];
     };
 }
 pub(crate) use forms_of_scale;

@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, REFERENCE_CONTRACTION, Readings};
-use crate::scale::{Scale, as_its_scale, forms_of_scale};
+use crate::scale::{as_its_scale, forms_of_scale};
 
 crate::variables::variables! {
     /// A position sensor whose scale is off.
@@ -31,12 +31,7 @@ crate::variables::variables! {
 }
 
 impl ContractionSensorGain {
-    forms_of_scale!("contraction_sensor_gain.");
-
-    fn scale(&self) -> Scale {
-        let Self { relative_error, bend, curvature, settling, settling_time } = *self;
-        Scale { middle: REFERENCE_CONTRACTION, relative_error, bend, curvature, settling: (settling, settling_time) }
-    }
+    forms_of_scale!("contraction_sensor_gain.", REFERENCE_CONTRACTION);
 }
 
 impl Effect for ContractionSensorGain {
@@ -51,14 +46,9 @@ impl Effect for ContractionSensorGain {
         holds: Holds::Exactly,
         forms: Self::FORMS,
         further_forms: Self::FURTHER_FORMS,
-        refinements: &[("contraction_sensor_gain.bend", &[0.005]), ("contraction_sensor_gain.curvature", &[0.002])],
+        refinements: Self::REFINEMENTS,
     };
-    const ENDS_INSIDE: &'static [&'static str] = &[
-        "contraction_sensor_gain.bend",
-        "contraction_sensor_gain.curvature",
-        "contraction_sensor_gain.settling",
-        "contraction_sensor_gain.settling_time",
-    ];
+    const ENDS_INSIDE: &'static [&'static str] = Self::SHAPES;
     const IS_OF_READING: bool = true;
 
     as_its_scale!();

@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, REFERENCE_FORCE, Readings};
-use crate::scale::{Scale, as_its_scale, forms_of_scale};
+use crate::scale::{as_its_scale, forms_of_scale};
 
 crate::variables::variables! {
     /// A force sensor whose scale is off.
@@ -33,12 +33,7 @@ crate::variables::variables! {
 }
 
 impl ForceSensorGain {
-    forms_of_scale!("force_sensor_gain.");
-
-    fn scale(&self) -> Scale {
-        let Self { relative_error, bend, curvature, settling, settling_time } = *self;
-        Scale { middle: REFERENCE_FORCE, relative_error, bend, curvature, settling: (settling, settling_time) }
-    }
+    forms_of_scale!("force_sensor_gain.", REFERENCE_FORCE);
 }
 
 impl Effect for ForceSensorGain {
@@ -53,14 +48,9 @@ impl Effect for ForceSensorGain {
         holds: Holds::Exactly,
         forms: Self::FORMS,
         further_forms: Self::FURTHER_FORMS,
-        refinements: &[("force_sensor_gain.bend", &[0.005]), ("force_sensor_gain.curvature", &[0.002])],
+        refinements: Self::REFINEMENTS,
     };
-    const ENDS_INSIDE: &'static [&'static str] = &[
-        "force_sensor_gain.bend",
-        "force_sensor_gain.curvature",
-        "force_sensor_gain.settling",
-        "force_sensor_gain.settling_time",
-    ];
+    const ENDS_INSIDE: &'static [&'static str] = Self::SHAPES;
     const IS_OF_READING: bool = true;
 
     as_its_scale!();

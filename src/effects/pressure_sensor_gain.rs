@@ -1,5 +1,5 @@
 use super::{Description, Effect, Holds, REFERENCE_PRESSURE, Readings};
-use crate::scale::{Scale, as_its_scale, forms_of_scale};
+use crate::scale::{as_its_scale, forms_of_scale};
 
 crate::variables::variables! {
     /// A pressure sensor whose scale is off.
@@ -32,12 +32,7 @@ crate::variables::variables! {
 }
 
 impl PressureSensorGain {
-    forms_of_scale!("pressure_sensor_gain.");
-
-    fn scale(&self) -> Scale {
-        let Self { relative_error, bend, curvature, settling, settling_time } = *self;
-        Scale { middle: REFERENCE_PRESSURE, relative_error, bend, curvature, settling: (settling, settling_time) }
-    }
+    forms_of_scale!("pressure_sensor_gain.", REFERENCE_PRESSURE);
 }
 
 impl Effect for PressureSensorGain {
@@ -52,14 +47,9 @@ impl Effect for PressureSensorGain {
         holds: Holds::Exactly,
         forms: Self::FORMS,
         further_forms: Self::FURTHER_FORMS,
-        refinements: &[("pressure_sensor_gain.bend", &[0.005]), ("pressure_sensor_gain.curvature", &[0.002])],
+        refinements: Self::REFINEMENTS,
     };
-    const ENDS_INSIDE: &'static [&'static str] = &[
-        "pressure_sensor_gain.bend",
-        "pressure_sensor_gain.curvature",
-        "pressure_sensor_gain.settling",
-        "pressure_sensor_gain.settling_time",
-    ];
+    const ENDS_INSIDE: &'static [&'static str] = Self::SHAPES;
     const IS_OF_READING: bool = true;
 
     as_its_scale!();

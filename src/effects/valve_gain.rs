@@ -1,4 +1,5 @@
 use super::{Description, Effect, Holds, Point};
+use crate::scale::Scale;
 use std::fmt::Write;
 
 /// Command in V at which the gain is stated when the characteristic is bent: the middle of the usual range.
@@ -34,6 +35,14 @@ crate::variables::variables! {
     }
 }
 
+impl ValveGain {
+    /// The characteristic without its knee.
+    fn scale(&self) -> Scale {
+        let Self { relative_error, bend, curvature, .. } = *self;
+        Scale { middle: MIDDLE, relative_error, bend: bend * MIDDLE, curvature, ..Scale::default() }
+    }
+}
+
 impl Effect for ValveGain {
     const DESCRIPTION: Description = Description {
         name: "valve_gain",
@@ -64,16 +73,14 @@ impl Effect for ValveGain {
     }
 
     fn command(&self, _at: &Point, _own: &[f64], command: f64) -> f64 {
-        let curved = self.curvature * ((command / MIDDLE).powi(2) - 1.0);
-        let bent = command * (1.0 + self.relative_error + self.bend * (command - MIDDLE) + curved);
-        bent + self.slope_change * (command - self.knee).max(0.0)
+        self.scale().shown(command, 0.0) + self.slope_change * (command - self.knee).max(0.0)
     }
 
     fn sentence(&self) -> String {
         let word = if self.relative_error < 0.0 { "less" } else { "more" };
         let mut told =
             format!("The valve gives {:.1} % {word} pressure per volt than nominal", 100.0 * self.relative_error.abs());
-        let at_twice = self.bend * MIDDLE + 3.0 * self.curvature;
+        let at_twice = self.scale().at_twice();
         if at_twice != 0.0 {
             let _ = write!(told, " at 2 V, and {:+.1} % on top at 4 V", 100.0 * at_twice);
         }
