@@ -217,7 +217,8 @@ impl StaticPull {
     #[inline]
     fn at(parameters: &Parameters, at: &Point, own: &[f64]) -> Self {
         let Parameters { muscle, force_models, effects, .. } = parameters;
-        let pressure = effects.effective_pressure(at, at.gauge_pressure);
+        let nominal_pull = || force_models.force(muscle, at.gauge_pressure, at.contraction);
+        let pressure = effects.effective_pressure(at, &nominal_pull, at.gauge_pressure);
         let contraction = effects.effective_contraction(at, own, at.contraction);
         let of_area = effects.area_force(at, own, force_models.pressure_force(muscle, pressure, contraction));
         let of_membrane = effects.elastic_contraction(at, own, contraction);

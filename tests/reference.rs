@@ -380,12 +380,14 @@ fn effects_agree_with_scipy() {
         (
             "threshold",
             &[
-                ("threshold_pressure.lost", 0.6e5),
+                ("threshold_pressure.lost", 0.4e5),
                 ("threshold_pressure.lasting", 0.1e5),
                 ("threshold_pressure.onset", 0.5e5),
                 ("threshold_pressure.fade", 0.7e5),
                 ("threshold_pressure.exponent", 1.5),
                 ("threshold_pressure.decrease_with_contraction", 0.3),
+                ("threshold_pressure.increase_with_pull", 0.2),
+                ("threshold_pressure.wider_with_pull", 0.3),
             ],
         ),
         (

@@ -255,8 +255,8 @@ pub trait Effect: Declared + Default {
     // Nothing from here to the static force may depend on the velocity: behind a cable this part is computed once, and the velocity at its end
     // is then looked for.
 
-    /// Gauge pressure in Pa that drives the muscle.
-    fn effective_pressure(&self, _at: &Point, pressure: f64) -> f64 {
+    /// Gauge pressure in Pa that drives the muscle, which without effects would pull with the given static force in N.
+    fn effective_pressure(&self, _at: &Point, _pull: &impl Fn() -> f64, pressure: f64) -> f64 {
         pressure
     }
     /// Contraction in m that braid and membrane feel, where the membrane's is not another one.
@@ -564,10 +564,10 @@ macro_rules! effects {
                 bandwidth
             }
 
-            /// Gauge pressure in Pa that drives the muscle.
+            /// Gauge pressure in Pa that drives the muscle, which without effects would pull with the given static force in N.
             #[inline]
-            pub fn effective_pressure(&self, at: &Point, mut pressure: f64) -> f64 {
-                $(pressure = self.$field.effective_pressure(at, pressure);)*
+            pub fn effective_pressure(&self, at: &Point, pull: &impl Fn() -> f64, mut pressure: f64) -> f64 {
+                $(pressure = self.$field.effective_pressure(at, pull, pressure);)*
                 pressure
             }
 

@@ -1,12 +1,18 @@
-use super::{Description, Effect, Holds, Point};
+use super::{Description, Effect, Holds, Point, REFERENCE_FORCE};
+
+/// Share of the loss, and of the pressure over which it fades, that no pull takes away; not physical, it keeps them above zero.
+const LEAST_SHARE: f64 = 0.05;
+/// Gauge pressure in Pa at which what lasts has set in.
+const ANY_PRESSURE: f64 = 1e6;
 
 crate::variables::variables! {
     /// Pressure that is lost before the muscle responds.
     ///
     /// # Model
-    /// The area feels p − (l₀ + l exp(−(p/f)ᵉ)) exp(−d x/0.1 m), but nothing below zero: `lost` l, `fade` f, `exponent` e,
-    /// `decrease_with_contraction` d, as a bladder comes to the braid while the muscle grows thick; `lasting` l₀ does not fade with the
-    /// pressure and, with an `onset` o, is l₀ (1 − exp(−p/o)).
+    /// The area feels p − (l₀ + l exp(−(p/f)ᵉ)) exp(−d x/0.1 m) (1 + w F/400 N), but nothing below zero: `lost` l, `exponent` e,
+    /// `decrease_with_contraction` d, as a bladder comes to the braid while the muscle grows thick, `increase_with_pull` w of the static
+    /// nominal pull F, as a stretched muscle is thin; `fade` is f/(1 + v F/400 N), with `wider_with_pull` v. `lasting` l₀ does not fade with
+    /// the pressure and, with an `onset` o, is l₀ (1 − exp(−p/o)).
     ///
     /// # In the data
     /// The force falls short at low pressure only, by the same in both directions; above a bar or two nothing is wrong.
@@ -27,6 +33,10 @@ crate::variables::variables! {
         exponent: f64 = 1.0, ONE, (0.5..=6.0);
         /// Decrease of the loss over 0.1 m of contraction, as a logarithm
         decrease_with_contraction: f64 = 0.0, ONE, (-1.0..=3.0);
+        /// Increase of the loss with a pull of 400 N
+        increase_with_pull: f64 = 0.0, ONE, (-0.3..=3.0);
+        /// Increase of the pressure over which the loss fades with a pull of 400 N
+        wider_with_pull: f64 = 0.0, ONE, (-0.3..=3.0);
         /// Pressure that is lost at any pressure
         lasting: f64 = 0.0, PASCAL, (0.0..=4e5);
         /// Pressure over which that sets in
@@ -35,12 +45,24 @@ crate::variables::variables! {
 }
 
 impl ThresholdPressure {
-    /// What is lost for good at a gauge pressure in Pa, Pa.
-    fn lasts(&self, gauge_pressure: f64) -> f64 {
-        if self.onset == 0.0 {
-            return self.lasting;
+    /// What is lost at a gauge pressure in Pa and a static pull in N, at rest length, Pa.
+    fn lost_at(&self, gauge_pressure: f64, pull: &impl Fn() -> f64) -> f64 {
+        let [more, wider] = self.grown(pull);
+        let pressure = gauge_pressure.max(0.0);
+        let set_in = if self.onset == 0.0 { 1.0 } else { 1.0 - (-pressure / self.onset).exp() };
+        let relative = pressure / (self.fade * wider);
+        let power = if self.exponent == 1.0 { relative } else { relative.powf(self.exponent) };
+        (self.lasting * set_in + self.lost * (-power).exp()) * more
+    }
+
+    /// Factors of the loss and of the pressure over which it fades at a pull in N.
+    fn grown(&self, pull: &impl Fn() -> f64) -> [f64; 2] {
+        let shares = [self.increase_with_pull, self.wider_with_pull];
+        if shares == [0.0; 2] {
+            return [1.0; 2];
         }
-        self.lasting * (1.0 - (-gauge_pressure.max(0.0) / self.onset).exp())
+        let relative = pull().max(0.0) / REFERENCE_FORCE;
+        shares.map(|share| (1.0 + share * relative).max(LEAST_SHARE))
     }
 }
 
@@ -48,7 +70,7 @@ impl Effect for ThresholdPressure {
     const DESCRIPTION: Description = Description {
         name: "threshold_pressure",
         meaning: "pressure lost before the muscle responds, which matters at low pressure",
-        equation: "p <- max(0, p - (l0 (1 - exp(-p/o)) + l exp(-(p/f)^e)) exp(-d x/0.1 m))",
+        equation: "p <- max(0, p - (l0 (1 - exp(-p/o)) + l exp(-(p/(f (1 + v F/400 N)))^e)) exp(-d x/0.1 m) (1 + w F/400 N))",
         signature: "force falls short at low pressure only, the same in both directions",
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
@@ -66,10 +88,19 @@ impl Effect for ThresholdPressure {
             &[("threshold_pressure.lasting", &[0.3e5])],
             &[("threshold_pressure.lasting", &[0.3e5]), ("threshold_pressure.onset", &[0.3e5])],
             &[("threshold_pressure.lasting", &[0.3e5]), ("threshold_pressure.decrease_with_contraction", &[0.5])],
+            &[("threshold_pressure.lasting", &[0.2e5]), ("threshold_pressure.increase_with_pull", &[0.5])],
+            &[
+                ("threshold_pressure.lost", &[0.6e5]),
+                ("threshold_pressure.fade", &[0.6e5]),
+                ("threshold_pressure.exponent", &[1.5]),
+                ("threshold_pressure.wider_with_pull", &[0.5]),
+            ],
         ],
         refinements: &[
             ("threshold_pressure.exponent", &[1.5, 2.5]),
             ("threshold_pressure.decrease_with_contraction", &[0.2]),
+            ("threshold_pressure.increase_with_pull", &[0.2]),
+            ("threshold_pressure.wider_with_pull", &[0.2]),
         ],
     };
 
@@ -77,21 +108,18 @@ impl Effect for ThresholdPressure {
         self.lost == 0.0 && self.lasting == 0.0
     }
 
-    fn effective_pressure(&self, at: &Point, pressure: f64) -> f64 {
+    fn effective_pressure(&self, at: &Point, pull: &impl Fn() -> f64, pressure: f64) -> f64 {
         if self.is_neutral() {
             return pressure;
         }
-        let relative = at.gauge_pressure.max(0.0) / self.fade;
-        let power = if self.exponent == 1.0 { relative } else { relative.powf(self.exponent) };
         let contracted = (-self.decrease_with_contraction * at.relative_contraction()).exp();
         // A pressure that was negative before is no business of this effect.
-        let lost = (self.lasts(at.gauge_pressure) + self.lost * (-power).exp()) * contracted;
-        (pressure - lost).max(pressure.min(0.0))
+        (pressure - self.lost_at(at.gauge_pressure, pull) * contracted).max(pressure.min(0.0))
     }
 
     fn sentence(&self) -> String {
-        if self.lost == 0.0 {
-            let at_once = 1e-5 * self.lasting;
+        let bar = |gauge_pressure: f64, pull: f64| 1e-5 * self.lost_at(gauge_pressure, &|| pull);
+        let told = if self.lost == 0.0 {
             let word = if self.decrease_with_contraction > 0.0 { "less" } else { "more" };
             let percent = 100.0 * (-self.decrease_with_contraction).exp_m1().abs();
             let then = if percent == 0.0 {
@@ -99,13 +127,22 @@ impl Effect for ThresholdPressure {
             } else {
                 format!(" at rest length, {percent:.0} % {word} at 0.1 m of contraction")
             };
-            return format!("The muscle responds late: {at_once:.2} bar are lost before it does{then}.");
+            format!("The muscle responds late: {:.2} bar are lost before it does{then}", bar(ANY_PRESSURE, 0.0))
+        } else {
+            format!(
+                "At low pressure the muscle responds late: {:.2} bar are lost at first, {:.2} bar at 1 bar",
+                bar(0.0, 0.0),
+                bar(1e5, 0.0)
+            )
+        };
+        if [self.increase_with_pull, self.wider_with_pull] == [0.0; 2] {
+            return format!("{told}.");
         }
-        let at_one_bar = self.lasts(1e5) + self.lost * (-(1e5 / self.fade).powf(self.exponent)).exp();
-        format!(
-            "At low pressure the muscle responds late: {:.2} bar are lost at first, {:.2} bar at 1 bar.",
-            (self.lasts(0.0) + self.lost) * 1e-5,
-            at_one_bar * 1e-5
-        )
+        let pulled = if self.lost == 0.0 {
+            format!("{:.2} bar", bar(ANY_PRESSURE, REFERENCE_FORCE))
+        } else {
+            format!("{:.2} and {:.2} bar", bar(0.0, REFERENCE_FORCE), bar(1e5, REFERENCE_FORCE))
+        };
+        format!("{told}; under a pull of {REFERENCE_FORCE:.0} N {pulled}.")
     }
 }

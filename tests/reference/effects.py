@@ -751,8 +751,10 @@ class LaidRope(Plant):
 
 class Threshold(Plant):
     def static_force(self, pressure, x, own):
-        lost = 0.1e5 * (1 - np.exp(-pressure / 0.5e5)) + 0.6e5 * np.exp(-((pressure / 0.7e5) ** 1.5))
-        return super().static_force(pressure - lost * np.exp(-3 * x), x, own)
+        pull = max(super().static_force(pressure, x, own), 0) / 400
+        fade = 0.7e5 * (1 + 0.3 * pull)
+        lost = 0.1e5 * (1 - np.exp(-pressure / 0.5e5)) + 0.4e5 * np.exp(-((pressure / fade) ** 1.5))
+        return super().static_force(pressure - lost * np.exp(-3 * x) * (1 + 0.2 * pull), x, own)
 
 
 class Friction(Plant):
