@@ -2,6 +2,7 @@
 //! and of any size. Where one of them explains far more than effects of the library do, these are makeshifts.
 
 use super::residuals::Data;
+use crate::effects::REFERENCE_FORCE;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::simulation::{Replay, slopes};
@@ -21,6 +22,11 @@ const FADING: (f64, f64, f64) = (1.0, 150.0, 1.25);
 /// Gauge pressures in Pa, the last one and their spacing, at one of which a hose leaves a sensor alone; and the finer spacing around the best.
 const AT_EASE: (f64, f64, f64) = (4e5, 5e4, 5e3);
 
+/// Half widths in m of the play of a sensor's bracket or wire, the first and the last, and the step between them, as a ratio.
+const PLAY: (f64, f64, f64) = (2e-4, 1e-2, 1.25);
+/// Where the sensor hangs in its play at the start, in half widths.
+const HANGING: [f64; 3] = [-1.0, 0.0, 1.0];
+
 /// A cause in no library.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unlisted {
@@ -34,6 +40,9 @@ pub enum Unlisted {
     Fading { time: f64 },
     /// A hose stiffens under pressure and pushes a sensor aside: in proportion to the gauge pressure in Pa above one at which it does not.
     Hose { signal: Signal, at_ease: f64 },
+    /// The position sensor follows with play of a half width in m, where it hangs at the `start`; or its bracket gives way so far, in
+    /// proportion to the pull.
+    Play { half_width: f64, start: f64, with_pull: bool },
 }
 
 impl Unlisted {
@@ -52,7 +61,10 @@ impl Unlisted {
             let pressures = (0..).map(move |k| f64::from(k) * spacing).take_while(move |pressure| *pressure <= last);
             pressures.map(move |at_ease| Self::Hose { signal, at_ease })
         });
-        slips.chain(talks).chain(rocking).chain(fading).chain(hoses).collect()
+        let plays = [false, true]
+            .into_iter()
+            .flat_map(|with_pull| steps(PLAY).map(move |half_width| Self::Play { half_width, start: 0.0, with_pull }));
+        slips.chain(talks).chain(rocking).chain(fading).chain(hoses).chain(plays).collect()
     }
 
     /// Forms between those of [`Self::all`].
@@ -68,6 +80,11 @@ impl Unlisted {
                 let (_, spacing, fine) = AT_EASE;
                 let steps = (spacing / fine) as i32;
                 (-steps..=steps).map(|k| Self::Hose { signal, at_ease: at_ease + f64::from(k) * fine }).collect()
+            }
+            Self::Play { half_width, with_pull, .. } => {
+                let all = around(half_width, PLAY.2)
+                    .flat_map(|half_width| HANGING.map(|start| Self::Play { half_width, start, with_pull }));
+                all.collect()
             }
             _ => vec![self],
         }
@@ -87,14 +104,15 @@ impl Unlisted {
         match self {
             Self::CrossTalk(signal) | Self::Hose { signal, .. } => signal,
             Self::Fading { .. } => Signal::Force,
-            Self::Slip { .. } | Self::Rocking { .. } => Signal::Contraction,
+            Self::Slip { .. } | Self::Rocking { .. } | Self::Play { .. } => Signal::Contraction,
         }
     }
 
     /// Smallest and largest size: no wheel gains way nor a cell charge, or loses more than all.
     pub fn sizes(self) -> (f64, f64) {
         match self {
-            Self::Slip { .. } | Self::Fading { .. } => (0.0, 1.0),
+            Self::Slip { .. } | Self::Fading { .. } | Self::Play { with_pull: false, .. } => (0.0, 1.0),
+            Self::Play { with_pull: true, .. } => (0.0, f64::INFINITY),
             Self::CrossTalk(_) | Self::Rocking { .. } | Self::Hose { .. } => (f64::NEG_INFINITY, f64::INFINITY),
         }
     }
@@ -104,7 +122,7 @@ impl Unlisted {
         match self {
             Self::Slip { .. } | Self::Fading { .. } | Self::Hose { .. } => 2,
             Self::CrossTalk(_) => 1,
-            Self::Rocking { .. } => 3,
+            Self::Rocking { .. } | Self::Play { .. } => 3,
         }
     }
 
@@ -118,6 +136,7 @@ impl Unlisted {
             Self::Rocking { .. } => "the acceleration, as if the post of the sensor rocked",
             Self::Fading { .. } => "what the force was before, as if the charge of a piezoelectric cell leaked",
             Self::Hose { .. } => "the pressure, as if a hose pushed the sensor",
+            Self::Play { .. } => "the way back, as if the sensor followed with play",
         }
     }
 
@@ -141,6 +160,14 @@ impl Unlisted {
                 let measured = || recording.bridged(Signal::GaugePressure);
                 let pressures = simulated.get(Signal::GaugePressure).map(<[f64]>::to_vec).or_else(measured)?;
                 Some(pressures.into_iter().map(|pressure| pressure - at_ease).collect())
+            }
+            Self::Play { half_width, start, with_pull } => {
+                let lost = lost_in_play(simulated.get(Signal::Contraction)?, half_width, start);
+                if !with_pull {
+                    return Some(lost);
+                }
+                let pulls = simulated.get(Signal::Force)?.iter().map(|force| force.max(0.0) / REFERENCE_FORCE);
+                Some(lost.into_iter().zip(pulls).map(|(lost, pull)| lost * pull).collect())
             }
         }
     }
@@ -198,6 +225,18 @@ fn lost_way(time: &[f64], velocity: &[f64], direction: f64, speed: f64) -> Vec<f
         lost
     });
     std::iter::once(0.0).chain(sums).collect()
+}
+
+/// What a reading is off by that follows with play of a half width, where it hangs at the start in half widths.
+fn lost_in_play(x: &[f64], half_width: f64, start: f64) -> Vec<f64> {
+    let mut behind = start * half_width;
+    let mut before = x[0];
+    let lost = x.iter().map(|x| {
+        behind = (behind - (x - before)).clamp(-half_width, half_width);
+        before = *x;
+        behind
+    });
+    lost.collect()
 }
 
 /// Deflection y of a post whose foot is accelerated as x is, ÿ + 2ζωẏ + ω²y = ẍ with ζ < 1, at rest at the start. Where x goes along
@@ -260,6 +299,15 @@ mod tests {
             let of_step = 1.0 - (-t / 2.0).exp();
             assert!((lag - (t - 2.0 * of_step + 3.0 * of_step)).abs() < 1e-12, "{t} s");
         }
+    }
+
+    #[test]
+    fn what_has_play_rests_on_the_way_back() {
+        let x = [0.0, 0.5, 3.0, 2.0, 1.5, 0.0, 0.5];
+        let shown =
+            |start| -> Vec<f64> { x.iter().zip(lost_in_play(&x, 1.0, start)).map(|(x, lost)| x + lost).collect() };
+        assert_eq!(shown(0.0), [0.0, 0.0, 2.0, 2.0, 2.0, 1.0, 1.0]);
+        assert_eq!(shown(-1.0), [-1.0, -0.5, 2.0, 2.0, 2.0, 1.0, 1.0]);
     }
 
     #[test]
