@@ -69,8 +69,16 @@ const SLOW: f64 = 0.2;
 const SLOWEST: f64 = 300.0;
 /// Argument beyond which flow grows no more, 6800 times as fast as a linear dashpot's: an integration can still follow it.
 const LARGEST_SINH: f64 = 12.0;
+/// Share of the larger of two opposite drifts that the smaller one takes back from which on it is no creep: nothing gives way for good, and
+/// what comes and goes may have any course.
+const TAKEN_BACK: f64 = 0.8;
 /// Drift per contraction of a membrane that would push ahead of its load for good.
 const AHEAD: f64 = -0.5;
+
+/// Whether one of two drifts takes most of the other one back.
+fn is_taken_back([first, second]: [f64; 2]) -> bool {
+    first * second < 0.0 && first.abs().min(second.abs()) > TAKEN_BACK * first.abs().max(second.abs())
+}
 
 impl Creep {
     /// What both drifts go for at a contraction in m and a pressure relative to the reference.
@@ -156,7 +164,8 @@ impl Effect for Creep {
     fn is_plausible(&self) -> bool {
         let relaxing = [(self.relaxing_stiffness_1, self.time_1), (self.relaxing_stiffness_2, self.time_2)];
         let never_relaxes = |(stiffness, time): &(f64, f64)| *stiffness != 0.0 && *time > (1.0 - NEARLY) * SLOWEST;
-        self.time_1 > SLOW && !relaxing.iter().any(never_relaxes)
+        let drifts = [[self.amplitude_1, self.amplitude_2], [self.pressure_drift_1, self.pressure_drift_2]];
+        self.time_1 > SLOW && !relaxing.iter().any(never_relaxes) && !drifts.into_iter().any(is_taken_back)
     }
 
     fn start(&self, at: &Point, own: &mut [f64]) {

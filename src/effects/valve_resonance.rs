@@ -36,6 +36,9 @@ crate::variables::variables! {
 /// Overshoot of a step below which it is a valve with a lag: that of one that rings with a damping ratio of 0.8.
 const LEAST_OVERSHOOT: f64 = 0.015;
 
+/// Natural frequency in rad/s from which on no proportional valve rings; what is fitted then is no ringing, but how fast its main stage is.
+const FASTEST: f64 = 150.0;
+
 /// Time constant in s below which a main stage shows nothing.
 const SHORTEST: f64 = 1e-3;
 
@@ -118,7 +121,7 @@ impl Effect for ValveResonance {
     }
 
     fn is_plausible(&self) -> bool {
-        self.is_neutral() || self.overshoot() > LEAST_OVERSHOOT
+        self.is_neutral() || self.overshoot() > LEAST_OVERSHOOT && self.natural_frequency < FASTEST
     }
 
     /// A valve that rings comes to rest where one of first order does.

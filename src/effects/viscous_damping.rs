@@ -2,6 +2,8 @@ use super::{Description, Effect, Holds, Point};
 
 /// Velocity in m/s at which the damping is stated.
 const REFERENCE_VELOCITY: f64 = 0.05;
+/// What a muscle may damp less than a nominal one of 80 N s/m, in N s/m: rubber and threads never move without a loss.
+const LEAST: f64 = -60.0;
 /// Velocity in m/s below which a power law goes over into a straight line; not physical, it keeps the slope finite.
 const SMALL_VELOCITY: f64 = 1e-3;
 
@@ -63,6 +65,12 @@ impl Effect for ViscousDamping {
 
     fn is_neutral(&self) -> bool {
         self.contraction == 0.0 && self.extension == 0.0
+    }
+
+    fn is_plausible(&self) -> bool {
+        // At up to 4 bar and 0.2 m.
+        let most_grown = 1.0 + self.with_pressure.abs() + self.with_contraction.abs();
+        self.contraction.min(self.extension) * most_grown > LEAST
     }
 
     fn muscle_force(&self, at: &Point, _own: &[f64], force: f64) -> f64 {
