@@ -241,3 +241,16 @@ impl Effect for Creep {
         format!("The membrane creeps: {}.", all.join(", and "))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drifts_that_take_each_other_back_are_no_creep() {
+        let creep =
+            |first: f64, second: f64| Creep { pressure_drift_1: first, pressure_drift_2: second, ..Creep::default() };
+        assert!([(0.02, 0.02), (0.02, -0.01), (-0.03, 0.0)].into_iter().all(|(a, b)| creep(a, b).is_plausible()));
+        assert!(!creep(-0.067, 0.064).is_plausible());
+    }
+}

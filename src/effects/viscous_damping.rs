@@ -91,9 +91,28 @@ impl Effect for ViscousDamping {
     }
 
     fn sentence(&self) -> String {
-        format!(
-            "Viscous damping: {:.0} N s/m more than nominal while shortening, {:.0} N s/m while lengthening.",
-            self.contraction, self.extension
-        )
+        let [up, down] = [self.contraction, self.extension].map(|more| {
+            let word = if more < 0.0 { "less" } else { "more" };
+            format!("{:.0} N s/m {word}", more.abs())
+        });
+        format!("Viscous damping: {up} than nominal while shortening, {down} while lengthening.")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_muscle_that_hardly_damps_is_none() {
+        let damping = |less: f64, with_pressure: f64| ViscousDamping {
+            extension: -less,
+            with_pressure,
+            ..ViscousDamping::default()
+        };
+        assert!(
+            [(20.0, 0.0), (50.0, 0.0), (25.0, 1.0)].into_iter().all(|(less, with)| damping(less, with).is_plausible())
+        );
+        assert!(![(70.0, 0.0), (40.0, -1.0)].into_iter().any(|(less, with)| damping(less, with).is_plausible()));
     }
 }
