@@ -2,8 +2,6 @@ use super::{Description, Effect, Holds, Point, REFERENCE_FORCE};
 
 /// Share of the loss, and of the pressure over which it fades, that no pull takes away; not physical, it keeps them above zero.
 const LEAST_SHARE: f64 = 0.05;
-/// Gauge pressure in Pa at which what lasts has set in.
-const ANY_PRESSURE: f64 = 1e6;
 
 crate::variables::variables! {
     /// Pressure that is lost before the muscle responds.
@@ -11,7 +9,7 @@ crate::variables::variables! {
     /// # Model
     /// The area feels p − (l₀ + l exp(−(p/f)ᵉ)) exp(−d x/0.1 m) (1 + w F/400 N), but nothing below zero: `lost` l, `exponent` e,
     /// `decrease_with_contraction` d, as a bladder comes to the braid while the muscle grows thick, `increase_with_pull` w of the static
-    /// nominal pull F, as a stretched muscle is thin; `fade` is f/(1 + v F/400 N), with `wider_with_pull` v. `lasting` l₀ does not fade with
+    /// nominal pull F, as a stretched muscle is thin; f = `fade` (1 + v F/400 N), `wider_with_pull` v. `lasting` l₀ does not fade with
     /// the pressure and, with an `onset` o, is l₀ (1 − exp(−p/o)).
     ///
     /// # In the data
@@ -119,6 +117,7 @@ impl Effect for ThresholdPressure {
 
     fn sentence(&self) -> String {
         let bar = |gauge_pressure: f64, pull: f64| 1e-5 * self.lost_at(gauge_pressure, &|| pull);
+        let lasting = |pull: f64| 1e-5 * self.lasting * self.grown(&|| pull)[0];
         let told = if self.lost == 0.0 {
             let word = if self.decrease_with_contraction > 0.0 { "less" } else { "more" };
             let percent = 100.0 * (-self.decrease_with_contraction).exp_m1().abs();
@@ -127,7 +126,7 @@ impl Effect for ThresholdPressure {
             } else {
                 format!(" at rest length, {percent:.0} % {word} at 0.1 m of contraction")
             };
-            format!("The muscle responds late: {:.2} bar are lost before it does{then}", bar(ANY_PRESSURE, 0.0))
+            format!("The muscle responds late: {:.2} bar are lost before it does{then}", lasting(0.0))
         } else {
             format!(
                 "At low pressure the muscle responds late: {:.2} bar are lost at first, {:.2} bar at 1 bar",
@@ -139,7 +138,7 @@ impl Effect for ThresholdPressure {
             return format!("{told}.");
         }
         let pulled = if self.lost == 0.0 {
-            format!("{:.2} bar", bar(ANY_PRESSURE, REFERENCE_FORCE))
+            format!("{:.2} bar", lasting(REFERENCE_FORCE))
         } else {
             format!("{:.2} and {:.2} bar", bar(0.0, REFERENCE_FORCE), bar(1e5, REFERENCE_FORCE))
         };
