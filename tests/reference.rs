@@ -303,6 +303,7 @@ fn effects_agree_with_scipy() {
                 ("temperature_drift.time_constant_2", 9.0),
             ],
         ),
+        ("growing_muscle", &[("temperature_drift.length_change", 6e-3), ("temperature_drift.time_constant", 4.0)]),
         (
             "warm_by_work",
             &[

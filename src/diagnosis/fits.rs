@@ -66,6 +66,21 @@ impl Fitted {
     pub fn is_possible(&self) -> bool {
         !self.hypothesis.is_impossible(&self.parameters)
     }
+
+    /// Refinements of which each alone, at its default, would let the effects be such as they can be.
+    fn shapes_to_blame(&self) -> Vec<&'static str> {
+        let would_do = |name: &&'static str| {
+            let [(variable, _), (_, default)] = [&self.parameters, &Parameters::default()].map(|of| declared(of, name));
+            !self.hypothesis.is_impossible(&with_values(&self.parameters, &[variable], &[default]))
+        };
+        self.hypothesis
+            .parts
+            .iter()
+            .flat_map(|part| part.refinements())
+            .map(|(name, _)| *name)
+            .filter(would_do)
+            .collect()
+    }
 }
 
 /// Where a fit starts.
@@ -200,8 +215,9 @@ impl<'a> Bench<'a> {
         self.with_fewer_free(fitted, &fitted.hypothesis.in_form_of(part.holding(&others)))
     }
 
-    /// Possible fits in the place of one that is impossible only by what ended at bounds of shapes: these at their defaults, or all other
-    /// refinements, of which one may have pushed them there.
+    /// Possible fits in the place of one that is impossible only by its shapes: those that ended at bounds at their defaults, or all other
+    /// refinements, of which one may have pushed them there, or one without which the effects could be: where a shape does next to nothing,
+    /// fits leave it anywhere.
     pub fn possible_instead(&self, fitted: &Fitted) -> impl Iterator<Item = Fitted> {
         let parts = &fitted.hypothesis.parts;
         let at_ends = fitted.parameters.effects.at_ends();
@@ -209,7 +225,10 @@ impl<'a> Bench<'a> {
         let without_ends = parts.iter().map(|part| part.holding(&at_ends)).collect();
         let without_others = parts.iter().map(|part| part.refined_as(|name| at_ends.contains(&name))).collect();
         let fewer = is_by_shapes.then_some([without_ends, without_others]).into_iter().flatten();
-        let fewer = fewer.map(|parts| Hypothesis { parts, ..fitted.hypothesis });
+        let blamed = fitted.shapes_to_blame().into_iter().filter(|name| !at_ends.contains(name));
+        let without_one: Vec<Vec<Part>> =
+            blamed.map(|name| parts.iter().map(|part| part.refined_as(|other| other != name)).collect()).collect();
+        let fewer = fewer.chain(without_one).map(|parts| Hypothesis { parts, ..fitted.hypothesis });
         let fewer = fewer.filter(|fewer| fewer.size() < fitted.hypothesis.size());
         fewer.filter_map(|fewer| self.with_fewer_free(fitted, &fewer)).filter(Fitted::is_possible)
     }
@@ -637,6 +656,22 @@ mod tests {
         // The second block would be worse by 0.16, though one of its residuals gets smaller; the third no better and no worse.
         forgive(&mut change, &[1.0, 1.0, 0.1, 1.0, 0.0, -1.0], (vec![0, 0, 1, 1, 2, 2], 3));
         assert_eq!(change, [-1.0, -1.5, 0.0, 0.0, 0.0, 2.0]);
+    }
+
+    #[test]
+    fn a_shape_that_does_nothing_is_to_blame_where_it_is_what_cannot_be() {
+        let effect = Effects::DESCRIPTIONS.iter().find(|effect| effect.name == "friction_hysteresis").unwrap();
+        let mut part = Part::plain(effect, 0);
+        part.refined = Which::those(effect.refinements, |_, _| true);
+        let hypothesis = Hypothesis { parts: vec![part], beside: None };
+        let mut parameters = Parameters::default();
+        let friction = &mut parameters.effects.friction_hysteresis;
+        // A second element that hardly counts and gives way over 15 cm.
+        (friction.half_width, friction.presliding_displacement) = (20.0, 5e-3);
+        (friction.second_share, friction.second_ratio, friction.knee) = (1e-3, 30.0, 3.0);
+        let fitted = Fitted { hypothesis, parameters, residuals: Vec::new(), losses: Vec::new() };
+        assert!(!fitted.is_possible());
+        assert_eq!(fitted.shapes_to_blame(), ["friction_hysteresis.second_share", "friction_hysteresis.second_ratio"]);
     }
 
     #[test]

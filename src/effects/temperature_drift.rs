@@ -17,15 +17,17 @@ crate::variables::variables! {
     /// # Model
     /// τ₁ dw₁/dt = 1 − k + k ((1 − m) |P|/(10 W) + m |dx/dt|/(0.1 m/s)) − w₁, and w₂ alike with τ₂; P = F_p dx/dt the power of the pressure's
     /// pull F_p without effects, `speed_share` m of what goes with the way alone, as the work of dry friction does. With
-    /// w = (1 − s) w₁ + s w₂ the area counts 1 + a w times, the elastic force 1 + e w times and the command of the valve 1 + v w times:
-    /// `time_constant` τ₁, `time_constant_2` τ₂, `share_2` s, `work_share` k, `area_change` a, `elastic_change` e, `valve_change` v. A force
+    /// w = (1 − s) w₁ + s w₂ the area counts 1 + a w times, the elastic force 1 + e w times, the command of the valve 1 + v w times, and the
+    /// muscle is contracted by l w more, as one whose rest length grew: `time_constant` τ₁, `time_constant_2` τ₂, `share_2` s, `work_share` k,
+    /// `area_change` a, `elastic_change` e, `valve_change` v, `length_change` l. A force
     /// sensor shows f w more and a pressure sensor q w, both with k = 0: `force_zero` f, `pressure_zero` q. Heat that spreads begins sooner
     /// and ends later than one exponential, 0 < s < 1; heat that first has to come through something begins slowly, s < 0 with τ₂ < τ₁. At
     /// the start w₁ = w₂ = 0, but for a second and a third recording that begin warm, `second` and `third`.
     ///
     /// # In the data
     /// One cycle differs from the next, the less the later; the residual grows from zero at the start and stays. Creep comes back after
-    /// every step. No data tell the zero of a sensor that is right when cold and drifts from one that settles.
+    /// every step. No data tell the zero of a sensor that is right when cold and drifts from one that settles, nor from that of the position
+    /// sensor a rest length that grows, where the motion is prescribed or slow.
     ///
     /// # Validity
     /// The first recording starts cold. Its surroundings warm the muscle, or its own work or way, of which a fixed share becomes heat; no muscle
@@ -40,6 +42,8 @@ crate::variables::variables! {
         elastic_change: f64 = 0.0, ONE, (-0.9..=2.0);
         /// Relative change of the gain of the valve when warm, as of its coil
         valve_change: f64 = 0.0, ONE, (-0.5..=0.5);
+        /// Change of the rest length of the muscle when warm
+        length_change: f64 = 0.0, METRE, (-0.05..=0.05);
         /// What the force sensor shows without pull when warm
         force_zero: f64 = 0.0, NEWTON, (-500.0..=500.0);
         /// What the pressure sensor shows in an open muscle when warm
@@ -64,6 +68,11 @@ crate::variables::variables! {
 }
 
 impl TemperatureDrift {
+    /// What muscle and valve change when warm.
+    fn changes(&self) -> [f64; 4] {
+        [self.area_change, self.elastic_change, self.valve_change, self.length_change]
+    }
+
     /// The least warmth on the way from cold to warm, by which it begins the wrong way; 0 where it does not.
     fn deepest(&self) -> f64 {
         let (share, one, other) = (self.share_2, self.time_constant, self.time_constant_2);
@@ -98,7 +107,7 @@ impl Effect for TemperatureDrift {
     const DESCRIPTION: Description = Description {
         name: "temperature_drift",
         meaning: "slow change while the muscle, its valve or a sensor warms up",
-        equation: "tau_i dw_i/dt = 1 - k + k ((1 - m) |P|/(10 W) + m |v|/(0.1 m/s)) - w_i;  w = (1 - s) w_1 + s w_2;  A <- A (1 + a w);  F_e <- F_e (1 + e w);  u <- u (1 + v w);  F_measured <- F_measured + f w;  p_measured <- p_measured + q w",
+        equation: "tau_i dw_i/dt = 1 - k + k ((1 - m) |P|/(10 W) + m |v|/(0.1 m/s)) - w_i;  w = (1 - s) w_1 + s w_2;  A <- A (1 + a w);  F_e <- F_e (1 + e w);  u <- u (1 + v w);  x_e <- x_e + l w;  F_measured <- F_measured + f w;  p_measured <- p_measured + q w",
         signature: "force residual that grows from zero and stays: the first cycle differs from the last",
         experiment: "the same cycle for several minutes, from cold",
         reference: "definition",
@@ -113,6 +122,7 @@ impl Effect for TemperatureDrift {
             ],
             &[("temperature_drift.force_zero", &[20.0, -20.0]), ("temperature_drift.time_constant", &[15.0])],
             &[("temperature_drift.valve_change", &[0.05, -0.05]), ("temperature_drift.time_constant", &[15.0])],
+            &[("temperature_drift.length_change", &[5e-3, -5e-3]), ("temperature_drift.time_constant", &[15.0])],
         ],
         // A leak of a shut chamber looks like it.
         further_forms: &[&[
@@ -132,8 +142,7 @@ impl Effect for TemperatureDrift {
     const STATE_SCALES: &'static [f64] = &[1.0, 1.0];
 
     fn is_neutral(&self) -> bool {
-        let of_muscle = self.area_change == 0.0 && self.elastic_change == 0.0;
-        of_muscle && self.valve_change == 0.0 && self.force_zero == 0.0 && self.pressure_zero == 0.0
+        self.changes() == [0.0; 4] && self.force_zero == 0.0 && self.pressure_zero == 0.0
     }
 
     fn is_plausible(&self) -> bool {
@@ -142,7 +151,7 @@ impl Effect for TemperatureDrift {
 
     // How warm a sensor is goes by time.
     fn rests(&self) -> bool {
-        [self.area_change, self.elastic_change, self.valve_change] == [0.0; 3]
+        self.changes() == [0.0; 4]
     }
 
     fn start(&self, _at: &Point, own: &mut [f64]) {
@@ -163,6 +172,10 @@ impl Effect for TemperatureDrift {
 
     fn command(&self, _at: &Point, own: &[f64], command: f64) -> f64 {
         command * (1.0 + self.valve_change * self.warmth(own))
+    }
+
+    fn effective_contraction(&self, _at: &Point, own: &[f64], contraction: f64) -> f64 {
+        contraction + self.length_change * self.warmth(own)
     }
 
     fn area_force(&self, _at: &Point, own: &[f64], force: f64) -> f64 {
@@ -204,6 +217,7 @@ impl Effect for TemperatureDrift {
             (self.area_change != 0.0, format!("the area of the muscle by {:+.1} %", 100.0 * self.area_change)),
             (self.elastic_change != 0.0, format!("its elastic force by {:+.1} %", 100.0 * self.elastic_change)),
             (self.valve_change != 0.0, format!("the gain of the valve by {:+.1} %", 100.0 * self.valve_change)),
+            (self.length_change != 0.0, format!("its rest length by {:+.2} mm", 1e3 * self.length_change)),
             (self.force_zero != 0.0, format!("the zero of the force sensor by {:+.1} N", self.force_zero)),
             (
                 self.pressure_zero != 0.0,

@@ -327,6 +327,18 @@ class SofterWhenWarm(HyperbolicWarmUp):
         now.force[self.at] += self.warm(now) * elastic_force(now.strain[self.at])
 
 
+class LongerWhenWarm(HyperbolicWarmUp):
+    """The muscle grows longer, by so many metres."""
+
+    LOW, HIGH = 4e-3, 12e-3
+
+    def stretch(self, now):
+        now.strain[self.at] += self.warm(now)
+
+    def act(self, now):
+        pass
+
+
 class WarmCoil(HyperbolicWarmUp):
     """The valve gives another pressure per volt as its coil warms."""
 
@@ -725,7 +737,7 @@ FAR = {
     "pressure_sensor_gain": [BentPressure],
     "force_sensor_offset": [SettlingForce],
     "force_sensor_gain": [BentForce],
-    "temperature_drift": [HyperbolicWarmUp, SofterWhenWarm, WarmCoil],
+    "temperature_drift": [HyperbolicWarmUp, LongerWhenWarm, SofterWhenWarm, WarmCoil],
 }
 
 # Forms that the families of the tool hold by now, or almost: named as far, they would flatter it.
@@ -745,6 +757,7 @@ SINCE_HELD = [
     KneedGain,
     LiftingSeal,
     LogisticThreshold,
+    LongerWhenWarm,
     NozzleFlow,
     PorousLeak,
     RingingPilot,

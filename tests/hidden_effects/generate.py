@@ -45,7 +45,8 @@ HANGING_ONLY = {
     "payload_mass", "series_elasticity", "contraction_sensor_gain", "contraction_sensor_delay", "unknown_rubber_stop",
     "unknown_pendulum", "unknown_guide_spot", "unknown_loose_bracket", "unknown_breathing_frame",
     "unknown_trembling_frame", "unknown_kinked_hose", "unknown_side_wall", "unknown_slipping_wheel",
-    "unknown_eccentric_pulley", "unknown_cross_talk", "unknown_drifting_clock",
+    "unknown_eccentric_pulley", "unknown_cross_talk", "unknown_drifting_clock", "unknown_slow_amplifier",
+    "unknown_wavy_encoder", "unknown_frozen_sensor", "unknown_shaking_floor", "unknown_cell_hysteresis",
 }  # fmt: skip
 NEEDS_COLUMN = {
     "pressure_sensor_offset": "gauge_pressure",
@@ -55,11 +56,15 @@ NEEDS_COLUMN = {
     "unknown_mains_hum": "force",
     "unknown_cross_talk": "force",
     "unknown_wandering_zero": "force",
+    "unknown_slow_amplifier": "force",
+    "unknown_cell_hysteresis": "force",
+    "unknown_hose_to_sensor": "gauge_pressure",
 }
 OF_VALVE = {
     "valve_lag", "valve_resonance", "valve_dead_time", "valve_dead_band", "valve_gain", "valve_offset",
     "supply_saturation", "flow_limit", "leakage", "unknown_coarse_converter", "unknown_compressor_cycle",
-    "unknown_hunting_valve", "pressure_sensor_offset", "pressure_sensor_gain",
+    "unknown_hunting_valve", "unknown_warm_gas", "unknown_hose_to_sensor", "pressure_sensor_offset",
+    "pressure_sensor_gain",
 }  # fmt: skip
 
 

@@ -236,6 +236,112 @@ class HuntingValve(Form):
         return command + self.volts * np.sin(2 * np.pi * self.frequency * t + 0.8 * np.sin(0.9 * t))
 
 
+class WarmGas(Form):
+    """Air that streams in is warm and cools at the walls, within a second and within several."""
+
+    @staticmethod
+    def sizes(random, severity):
+        times = {"soon": random.uniform(0.4, 1.5), "late": random.uniform(3, 10)}
+        return {"share": severity * random.uniform(0.1, 0.3), "filling": random.uniform(1.0, 1.6), **times}
+
+    def begin(self, now):
+        self.above = np.zeros((2, len(self.share)))
+
+    def valve(self, now, before):
+        change = now.p[self.at] - before[self.at]
+        warmed = self.share * np.where(change > 0, self.filling, 1) * change
+        gained = np.stack([0.7 * warmed, 0.3 * warmed]) - STEP * self.above / np.stack([self.soon, self.late])
+        self.above += gained
+        now.p[self.at] += gained.sum(axis=0)
+
+
+class HoseToSensor(Form):
+    """The pressure sensor sits behind a thin hose of its own."""
+
+    @staticmethod
+    def sizes(random, severity):
+        return {"seconds": severity * random.uniform(0.03, 0.12)}
+
+    def show(self, time, p, x, force):
+        return smoothed(p, self.seconds), x, force
+
+
+class SlowAmplifier(Form):
+    """The amplifier of the force sensor smoothes what it is given."""
+
+    @staticmethod
+    def sizes(random, severity):
+        return {"seconds": severity * random.uniform(0.03, 0.15)}
+
+    def show(self, time, p, x, force):
+        return p, x, smoothed(force, self.seconds)
+
+
+def smoothed(series, seconds):
+    """Columns behind a pole each, at rest at first."""
+
+    def one(column, seconds):
+        kept = np.exp(-STEP * STORE_EVERY / seconds)
+        return lfilter([1 - kept], [1, -kept], column, zi=[kept * column[0]])[0]
+
+    return np.stack([one(column, s) for column, s in zip(series.T, seconds, strict=True)], axis=1)
+
+
+class WavyEncoder(Form):
+    """The wheel of the encoder is not centred."""
+
+    @staticmethod
+    def sizes(random, severity):
+        wheel = {"way": random.uniform(0.02, 0.06), "angle": random.uniform(0, 2 * np.pi)}
+        return {"metre": severity * random.uniform(0.5e-3, 2e-3), **wheel}
+
+    def show(self, time, p, x, force):
+        return p, x + self.metre * np.sin(2 * np.pi * x / self.way + self.angle), force
+
+
+class FrozenSensor(Form):
+    """The position reading stands still now and then, and jumps to where it should be."""
+
+    @staticmethod
+    def sizes(random, severity):
+        return {"seconds": severity * random.uniform(0.3, 1.2), "every": random.uniform(3, 8)}
+
+    def show(self, time, p, x, force):
+        frozen = [self.freezing(k, time, column) for k, column in enumerate(x.T)]
+        return p, np.stack(frozen, axis=1), force
+
+    def freezing(self, k, time, x):
+        count = np.arange(np.ceil(time[-1] / self.every[k]))
+        begins = self.every[k] * (count + 0.618 * count % 1)  # the golden ratio, so that it has no rhythm
+        latest = begins[np.maximum(np.searchsorted(begins, time, side="right") - 1, 0)]
+        stands = (time >= latest) & (time < latest + self.seconds[k])
+        return np.interp(np.where(stands, latest, time), time, x)
+
+
+class ShakingFloor(Form):
+    """A machine beside shakes the load."""
+
+    @staticmethod
+    def sizes(random, severity):
+        return {"newton": severity * random.uniform(10, 40), "frequency": random.uniform(1.5, 6)}
+
+    def act(self, now):
+        t = max(now.time, 0.0)
+        now.external[self.at] = self.newton * np.sin(2 * np.pi * self.frequency * t + 0.5 * np.sin(0.7 * t))
+
+
+class CellHysteresis(Form):
+    """A part of the force cell's spring follows with play."""
+
+    @staticmethod
+    def sizes(random, severity):
+        return {"newton": severity * random.uniform(3, 12)}
+
+    def show(self, time, p, x, force):
+        half = self.newton / 0.4
+        return p, x, 0.6 * force + 0.4 * half * play(force / half, np.ones(len(half)))
+
+
 UNKNOWN = {
     "unknown_loose_bracket": [LooseBracket],
     "unknown_guide_spot": [GuideSpot],
@@ -254,4 +360,11 @@ UNKNOWN = {
     "unknown_drifting_clock": [DriftingClock],
     "unknown_wandering_zero": [WanderingZero],
     "unknown_hunting_valve": [HuntingValve],
+    "unknown_warm_gas": [WarmGas],
+    "unknown_hose_to_sensor": [HoseToSensor],
+    "unknown_slow_amplifier": [SlowAmplifier],
+    "unknown_wavy_encoder": [WavyEncoder],
+    "unknown_frozen_sensor": [FrozenSensor],
+    "unknown_shaking_floor": [ShakingFloor],
+    "unknown_cell_hysteresis": [CellHysteresis],
 }

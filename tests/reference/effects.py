@@ -641,6 +641,13 @@ class WarmCoil(Timed):
         return VALVE_BANDWIDTH * ((1 - lost) * target - pressure)
 
 
+class GrowingMuscle(Timed):
+    """Its rest length grows by 6 mm as it warms up within 4 s."""
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x + 6e-3 * (1 - np.exp(-own[0] / 4.0)), own)
+
+
 class SlowStart(Plant):
     """Two lags in a row, 30 % of both over at the start."""
 
@@ -873,6 +880,7 @@ CASES = [
     Case("warm_by_work", WarmByWork(), STAIRS),
     Case("warm_by_way", WarmByWay(), STAIRS),
     Case("warm_coil", WarmCoil(), STAIRS),
+    Case("growing_muscle", GrowingMuscle(), STAIRS),
     Case("stiffer_end", StifferEnd(), STAIRS),
     Case("slow_start", SlowStart(), STAIRS),
     Case("wrong_bore", WrongBore(), STAIRS),
