@@ -1,5 +1,6 @@
 //! What speaks for a hypothesis: what it takes off the error, and what may be left of it.
 
+use super::LEAST_BESIDE_OTHERS;
 use crate::diagnosis::fits::Fitted;
 use crate::diagnosis::residuals::{Data, Loss};
 use crate::measurement::Signal;
@@ -75,10 +76,15 @@ pub fn is_unsound(losses: &[Loss], data: &Data) -> bool {
     !leaves_at_most(losses, |signal| left_by_structure(signal, data))
 }
 
-/// Whether no more is left of what there was before than forms may leave, which are never known exactly, or a sound model.
+/// Whether no more is left of what there was before than forms may leave, which are never known exactly, or a sound model. Where there was
+/// less than the noise itself, that says nothing of a cause, neither before nor now: noise with a long memory is told only so well.
 pub fn may_be_form(before: &[Loss], left: &[Loss], data: &Data) -> bool {
     let before = beyond_noise(before);
-    leaves_at_most(left, |signal| left_by_form(before[&signal]).max(left_by_structure(signal, data)))
+    leaves_at_most(left, |signal| {
+        let of_form =
+            if before[&signal] < LEAST_BESIDE_OTHERS { LEAST_BESIDE_OTHERS } else { left_by_form(before[&signal]) };
+        of_form.max(left_by_structure(signal, data))
+    })
 }
 
 /// Share of the error beyond noise that goes away.
