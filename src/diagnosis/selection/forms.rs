@@ -1,12 +1,12 @@
 //! Hypotheses in their best form: refined, in other forms of their effects, fitted to the end.
 
 use super::evidence::{beyond_noise, evidence, is_unsound, leaves_at_most, left_by_form, left_by_structure};
-use super::naming::{LEAST_EXPLAINED, LEAST_EXPLAINED_EXACTLY};
+use super::naming::{LEAST_EXPLAINED, LEAST_EXPLAINED_EXACTLY, RIVAL};
 use super::{
     Judged, LEAST_EVIDENCE, Search, carried_on, is_possible, possible, price_of_parameter, same_effects, sorted,
 };
 use crate::diagnosis::fits::{Fitted, Slopes};
-use crate::diagnosis::hypothesis::{Part, Which};
+use crate::diagnosis::hypothesis::{Hypothesis, Part, Which};
 use crate::diagnosis::residuals::Scope;
 use rayon::prelude::*;
 
@@ -92,7 +92,7 @@ impl Search<'_> {
     pub(super) fn in_best_form(&self, judged: Judged, best: Option<&Judged>) -> Judged {
         let refined = self.finished_refined(judged.clone(), best, |judged| self.refined(judged));
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
-            return refined;
+            return best.map_or(refined.clone(), |best| self.in_simpler_form(refined, best));
         }
         let partly = refined
             .fitted
@@ -101,17 +101,31 @@ impl Search<'_> {
             .iter()
             .any(|part| ![Which::NONE, self.bench.fully(part.effect)].contains(&part.refined));
         let further = partly.then(|| self.finished_refined(refined.clone(), best, |judged| self.refined(judged)));
-        let other =
-            self.in_other_forms(&judged).map(|other| self.finished_refined(other, best, |other| self.refined(other)));
+        let other = self.in_other_forms(&judged, |_| true);
+        let other = other.map(|other| self.finished_refined(other, best, |other| self.refined(other)));
         let all = further.into_iter().chain(other).filter(|fit| is_possible(fit) || !is_possible(&refined));
         all.chain([refined.clone()]).max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or(refined)
     }
 
-    /// The hypothesis with one of its effects in another form, the best of these: of the starts only the most promising were fitted.
-    fn in_other_forms(&self, judged: &Judged) -> Option<Judged> {
+    /// A single effect that leaves nothing, but has not the odds of the best, in a form with fewer parameters where that is better: the start that
+    /// promises most need not be that of the form which needs no refinements.
+    fn in_simpler_form(&self, rival: Judged, best: &Judged) -> Judged {
+        let Hypothesis { parts, .. } = &rival.fitted.hypothesis;
+        if parts.len() > 1 || evidence(&rival.fitted, &best.fitted) < RIVAL {
+            return rival;
+        }
+        let size = rival.fitted.hypothesis.size();
+        let simpler = self.in_other_forms(&rival, |part| part.freed().count() < size).map(|other| self.finished(other));
+        let better = simpler.filter(|other| is_possible(other) && other.score > rival.score);
+        better.unwrap_or(rival)
+    }
+
+    /// The hypothesis with one of its effects in another form that is wanted, the best of these: of the starts only the most promising were fitted.
+    fn in_other_forms(&self, judged: &Judged, is_wanted: impl Fn(Part) -> bool) -> Option<Judged> {
         let parts = &judged.fitted.hypothesis.parts;
         let others = parts.iter().flat_map(|own| {
-            self.bench.forms(own.effect).filter(|part| part.form != own.form).map(move |part| (*own, part))
+            let forms = self.bench.forms(own.effect).filter(|part| part.form != own.form && is_wanted(*part));
+            forms.map(|part| (*own, part))
         });
         let fits = others.collect::<Vec<_>>().into_par_iter().filter_map(|(own, part)| {
             let start = self.bench.best_start(&judged.fitted.parameters, own, part)?;

@@ -20,7 +20,7 @@ pub const LEAST_EXPLAINED_EXACTLY: (f64, f64) = (0.995, 0.95);
 /// threshold h before it: of the mean square h²/3 of that, the variance h²/12 cannot be foretold.
 const LEAST_EXPLAINED_BUT_FOR_CHANCE: (f64, f64) = (0.75, 0.75);
 /// Odds up to which a rival explains the data as well as the best: 20 to 1, in natural logarithm.
-const RIVAL: f64 = 3.0;
+pub const RIVAL: f64 = 3.0;
 /// Variance that a rival may leave beside what the best leaves, where both leave no more than [`LEFT_BY_FORM`]: as much lies
 /// in the forms, which are never known exactly. Beside a single cause one in a simpler form may leave all of that.
 const ALSO_BY_FORM: f64 = 3.0;
