@@ -217,7 +217,10 @@ impl Effect for TemperatureDrift {
             (self.area_change != 0.0, format!("the area of the muscle by {:+.1} %", 100.0 * self.area_change)),
             (self.elastic_change != 0.0, format!("its elastic force by {:+.1} %", 100.0 * self.elastic_change)),
             (self.valve_change != 0.0, format!("the gain of the valve by {:+.1} %", 100.0 * self.valve_change)),
-            (self.length_change != 0.0, format!("its rest length by {:+.2} mm", 1e3 * self.length_change)),
+            (
+                self.length_change != 0.0,
+                format!("the rest length of the muscle by {:+.2} mm", 1e3 * self.length_change),
+            ),
             (self.force_zero != 0.0, format!("the zero of the force sensor by {:+.1} N", self.force_zero)),
             (
                 self.pressure_zero != 0.0,

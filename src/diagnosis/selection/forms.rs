@@ -92,7 +92,10 @@ impl Search<'_> {
     pub(super) fn in_best_form(&self, judged: Judged, best: Option<&Judged>) -> Judged {
         let refined = self.finished_refined(judged.clone(), best, |judged| self.refined(judged));
         if !is_unsound(&refined.fitted.losses, &self.bench.data) {
-            return best.map_or(refined.clone(), |best| self.in_simpler_form(refined, best));
+            return match best {
+                Some(best) => self.in_simpler_form(refined, best),
+                None => refined,
+            };
         }
         let partly = refined
             .fitted
