@@ -219,16 +219,15 @@ impl<'a> Bench<'a> {
     /// refinements, of which one may have pushed them there, or one without which the effects could be: where a shape does next to nothing,
     /// fits leave it anywhere.
     pub fn possible_instead(&self, fitted: &Fitted) -> impl Iterator<Item = Fitted> {
-        let parts = &fitted.hypothesis.parts;
+        let hypothesis = &fitted.hypothesis;
         let at_ends = fitted.parameters.effects.at_ends();
-        let is_by_shapes = !at_ends.is_empty() && !parts.iter().any(|part| at_ends.contains(&part.size().0));
-        let without_ends = parts.iter().map(|part| part.holding(&at_ends)).collect();
-        let without_others = parts.iter().map(|part| part.refined_as(|name| at_ends.contains(&name))).collect();
-        let fewer = is_by_shapes.then_some([without_ends, without_others]).into_iter().flatten();
+        let is_by_shapes = !at_ends.is_empty() && !hypothesis.parts.iter().any(|part| at_ends.contains(&part.size().0));
+        let held = hypothesis.parts.iter().map(|part| part.holding(&at_ends)).collect();
+        let without_ends = Hypothesis { parts: held, ..*hypothesis };
+        let without_others = hypothesis.refined_as(|name| at_ends.contains(&name));
         let blamed = fitted.shapes_to_blame().into_iter().filter(|name| !at_ends.contains(name));
-        let without_one: Vec<Vec<Part>> =
-            blamed.map(|name| parts.iter().map(|part| part.refined_as(|other| other != name)).collect()).collect();
-        let fewer = fewer.chain(without_one).map(|parts| Hypothesis { parts, ..fitted.hypothesis });
+        let without_one: Vec<Hypothesis> = blamed.map(|name| hypothesis.refined_as(|other| other != name)).collect();
+        let fewer = is_by_shapes.then_some([without_ends, without_others]).into_iter().flatten().chain(without_one);
         let fewer = fewer.filter(|fewer| fewer.size() < fitted.hypothesis.size());
         fewer.filter_map(|fewer| self.with_fewer_free(fitted, &fewer)).filter(Fitted::is_possible)
     }

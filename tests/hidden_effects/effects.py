@@ -286,6 +286,12 @@ class WarmUp(Form):
 # --- Valve ------------------------------------------------------------------------------------------------------------
 
 
+def smoothed(series, kept):
+    """Columns behind a pole each, which keeps a share of its state from one sample to the next; at rest at first."""
+    columns = [lfilter([1 - a], [1, -a], u, zi=[a * u[0]])[0] for a, u in zip(kept, series.T, strict=True)]
+    return np.stack(columns, axis=1)
+
+
 class SecondPole(Form):
     """A hose or pilot stage before the valve."""
 
@@ -294,9 +300,7 @@ class SecondPole(Form):
         return {"time": severity * random.uniform(0.03, 0.12)}
 
     def drive(self, command):
-        kept = np.exp(-STEP / self.time)
-        columns = [lfilter([1 - a], [1, -a], u, zi=[a * u[0]])[0] for a, u in zip(kept, command.T, strict=True)]
-        return np.stack(columns, axis=1)
+        return smoothed(command, np.exp(-STEP / self.time))
 
 
 class SlowerWhenFull(Form):

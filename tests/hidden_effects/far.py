@@ -21,6 +21,7 @@ from effects import (
     WeakSupply,
     either_sign,
     play,
+    smoothed,
 )
 from plant import STEP, VALVE_GAIN, area, elastic_force
 
@@ -301,8 +302,8 @@ class BentScale(HeavierLoad):
         now.mass[self.at] += self.additional * (now.mass[self.at] / self.lightest) ** self.power
 
 
-class HyperbolicWarmUp(Form):
-    """The rubber warms: the area changes as t/(t + tau), fast at first and for long after."""
+class HyperbolicWarmth(Form):
+    """Something changes as t/(t + tau), fast at first and for long after."""
 
     LOW, HIGH = 0.04, 0.1
 
@@ -314,11 +315,15 @@ class HyperbolicWarmUp(Form):
         t = max(now.time, 0.0)
         return self.change * t / (t + self.half)
 
+
+class HyperbolicWarmUp(HyperbolicWarmth):
+    """The rubber warms: the area changes."""
+
     def act(self, now):
         now.force[self.at] += self.warm(now) * now.p[self.at] * area(now.strain[self.at])
 
 
-class SofterWhenWarm(HyperbolicWarmUp):
+class SofterWhenWarm(HyperbolicWarmth):
     """The same of the elastic force alone."""
 
     LOW, HIGH = 0.1, 0.25
@@ -327,7 +332,7 @@ class SofterWhenWarm(HyperbolicWarmUp):
         now.force[self.at] += self.warm(now) * elastic_force(now.strain[self.at])
 
 
-class LongerWhenWarm(HyperbolicWarmUp):
+class LongerWhenWarm(HyperbolicWarmth):
     """The muscle grows longer, by so many metres."""
 
     LOW, HIGH = 4e-3, 12e-3
@@ -335,18 +340,12 @@ class LongerWhenWarm(HyperbolicWarmUp):
     def stretch(self, now):
         now.strain[self.at] += self.warm(now)
 
-    def act(self, now):
-        pass
 
-
-class WarmCoil(HyperbolicWarmUp):
+class WarmCoil(HyperbolicWarmth):
     """The valve gives another pressure per volt as its coil warms."""
 
     def aim(self, now):
         now.target[self.at] *= 1 + self.warm(now)
-
-    def act(self, now):
-        pass
 
 
 # --- Valve ------------------------------------------------------------------------------------------------------------
@@ -373,12 +372,7 @@ class TwoMorePoles(Form):
 
     def drive(self, command):
         kept = np.exp(-STEP / (self.time / 2))
-        columns = []
-        for a, u in zip(kept, command.T, strict=True):
-            for _ in range(2):
-                u = lfilter([1 - a], [1, -a], u, zi=[a * u[0]])[0]
-            columns.append(u)
-        return np.stack(columns, axis=1)
+        return smoothed(smoothed(command, kept), kept)
 
 
 class RingingPilot(Form):

@@ -7,7 +7,7 @@ depends on (a place, the time, an oscillation, a signal that should have no say)
 import numpy as np
 from scipy.signal import bilinear, lfilter
 
-from effects import Form, either_sign, play
+from effects import Form, either_sign, play, smoothed
 from plant import GRAVITY, STEP, STORE_EVERY
 
 # --- Mechanics --------------------------------------------------------------------------------------------------------
@@ -255,6 +255,11 @@ class WarmGas(Form):
         now.p[self.at] += gained.sum(axis=0)
 
 
+def kept(seconds):
+    """What poles keep from one stored sample to the next."""
+    return np.exp(-STEP * STORE_EVERY / seconds)
+
+
 class HoseToSensor(Form):
     """The pressure sensor sits behind a thin hose of its own."""
 
@@ -263,7 +268,7 @@ class HoseToSensor(Form):
         return {"seconds": severity * random.uniform(0.03, 0.12)}
 
     def show(self, time, p, x, force):
-        return smoothed(p, self.seconds), x, force
+        return smoothed(p, kept(self.seconds)), x, force
 
 
 class SlowAmplifier(Form):
@@ -274,17 +279,7 @@ class SlowAmplifier(Form):
         return {"seconds": severity * random.uniform(0.03, 0.15)}
 
     def show(self, time, p, x, force):
-        return p, x, smoothed(force, self.seconds)
-
-
-def smoothed(series, seconds):
-    """Columns behind a pole each, at rest at first."""
-
-    def one(column, seconds):
-        kept = np.exp(-STEP * STORE_EVERY / seconds)
-        return lfilter([1 - kept], [1, -kept], column, zi=[kept * column[0]])[0]
-
-    return np.stack([one(column, s) for column, s in zip(series.T, seconds, strict=True)], axis=1)
+        return p, x, smoothed(force, kept(self.seconds))
 
 
 class WavyEncoder(Form):

@@ -6,7 +6,7 @@ use super::{
     Judged, LEAST_EVIDENCE, Search, carried_on, is_possible, possible, price_of_parameter, same_effects, sorted,
 };
 use crate::diagnosis::fits::{Fitted, Slopes};
-use crate::diagnosis::hypothesis::{Hypothesis, Part, Which};
+use crate::diagnosis::hypothesis::{Part, Which};
 use crate::diagnosis::residuals::Scope;
 use rayon::prelude::*;
 
@@ -113,11 +113,11 @@ impl Search<'_> {
     /// A single effect that leaves nothing, but has not the odds of the best, in a form with fewer parameters where that is better: the start that
     /// promises most need not be that of the form which needs no refinements.
     fn in_simpler_form(&self, rival: Judged, best: &Judged) -> Judged {
-        let Hypothesis { parts, .. } = &rival.fitted.hypothesis;
-        if parts.len() > 1 || evidence(&rival.fitted, &best.fitted) < RIVAL {
+        let hypothesis = &rival.fitted.hypothesis;
+        if hypothesis.parts.len() > 1 || evidence(&rival.fitted, &best.fitted) < RIVAL {
             return rival;
         }
-        let size = rival.fitted.hypothesis.size();
+        let size = hypothesis.size();
         let simpler = self.in_other_forms(&rival, |part| part.freed().count() < size).map(|other| self.finished(other));
         let better = simpler.filter(|other| is_possible(other) && other.score > rival.score);
         better.unwrap_or(rival)
