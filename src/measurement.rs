@@ -1,7 +1,7 @@
 //! Recordings: columns of a CSV file in SI units.
 
 use crate::{Error, Result};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// What a column of a recording means.
@@ -77,12 +77,16 @@ pub struct Recording {
     units: BTreeMap<Signal, &'static str>,
     /// How many samples of the file there were to each of these, see [`Self::thinned`].
     every: usize,
+    /// Whether the command jumps at the samples that show it, see [`Self::with_late_jumps`].
+    late_jumps: bool,
     /// What a person should know about how the file was read.
     pub notes: Vec<String>,
 }
 
 /// Fewest samples that are worth looking at.
 const FEWEST_SAMPLES: usize = 10;
+/// Share of its span that a far jump of the command takes.
+const FAR: f64 = 0.01;
 /// Samples that thinning leaves at least.
 const THINNED_SAMPLES: usize = 1000;
 
@@ -138,14 +142,26 @@ impl Recording {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let time = signals.remove(&Time).unwrap_or_default();
         let units = columns.iter().flatten().map(|column| (column.signal, column.unit)).collect();
-        Self { path: path.to_owned(), name, number: None, time, lines, signals, units, notes, every: 1 }.checked()
+        Self {
+            path: path.to_owned(),
+            name,
+            number: None,
+            time,
+            lines,
+            signals,
+            units,
+            notes,
+            every: 1,
+            late_jumps: false,
+        }
+        .checked()
     }
 
     /// An experiment that is yet to be made: its inputs in SI units, each of shape `(n_samples,)`.
     pub(crate) fn planned(name: &str, time: Vec<f64>, inputs: BTreeMap<Signal, Vec<f64>>) -> Self {
         let (path, name) = (PathBuf::from(name), name.to_owned());
         let (lines, units, notes) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Self { path, name, number: None, time, lines, signals: inputs, units, notes, every: 1 }
+        Self { path, name, number: None, time, lines, signals: inputs, units, notes, every: 1, late_jumps: false }
     }
 
     /// Refuses what no use could be made of, and drops rows without a new time.
@@ -245,14 +261,18 @@ impl Recording {
 
     /// The recording with about one sample per `period` in s, as far as there are as many and at least a thousand remain.
     /// Samples are left out; the command is a weighted mean, its weight falling to zero at the next sample that stays, so that
-    /// a step between two of them keeps its time.
+    /// a step between two of them keeps its time. Where the command jumps at a sample, that one stays, and no mean reaches over the jump.
     pub fn thinned(&self, period: f64) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let every = ((period / self.period()).round() as usize).min(self.time.len() / THINNED_SAMPLES).max(1);
-        let kept = || (0..self.time.len()).step_by(every);
+        let jumps = self.late_jumps();
+        let kept = || (0..self.time.len()).filter(|k| k % every == 0 || jumps.contains(k));
         let picked = |values: &[f64]| kept().map(|k| values[k]).collect();
         let mean = |values: &[f64], centre: usize| {
             let near = centre.saturating_sub(every - 1)..(centre + every).min(values.len());
+            if jumps.iter().any(|jump| near.contains(jump)) {
+                return values[centre];
+            }
             let present = near.filter(|k| !values[*k].is_nan());
             let weighted = present.map(|k| ((every - k.abs_diff(centre)) as f64, values[k]));
             let (weights, sum) =
@@ -275,23 +295,68 @@ impl Recording {
     /// The recording with an instant more in the middle between any two samples, where each signal is on the cubic through the
     /// two samples before and after, its gaps bridged.
     pub fn doubled(&self) -> Self {
-        self.with_middles(|_, values, k| self.halfway(values, k))
+        let jumps = self.late_jumps();
+        self.with_middles(|signal, values, k| match signal {
+            Command if jumps.contains(&(k + 1)) => values[k],
+            Command if [k, k + 2].iter().any(|end| jumps.contains(end)) => 0.5 * (values[k] + values[k + 1]),
+            _ => self.halfway(values, k),
+        })
+    }
+
+    /// The recording of a command that jumps at the very sample that shows the jump, as where one program sets and logs it, and not somewhere
+    /// between that sample and the one before.
+    pub fn with_late_jumps(&self) -> Self {
+        Self { late_jumps: true, ..self.clone() }
+    }
+
+    /// Whether it is such a recording.
+    pub fn jumps_late(&self) -> bool {
+        self.late_jumps
+    }
+
+    /// The command as it comes to each sample, its gaps bridged: on straight lines from the sample before, but for jumps at the sample itself.
+    pub fn arriving_command(&self) -> Option<Vec<f64>> {
+        let command = self.bridged(Command)?;
+        let mut arriving = command.clone();
+        self.late_jumps().into_iter().for_each(|k| arriving[k] = command[k - 1]);
+        Some(arriving)
+    }
+
+    /// Samples at which the command jumps, where it does that at samples.
+    fn late_jumps(&self) -> BTreeSet<usize> {
+        if self.late_jumps { self.jumps() } else { BTreeSet::new() }
+    }
+
+    /// Whether the command jumps by more than a hundredth of its span.
+    pub fn jumps_far(&self) -> bool {
+        let Some(command) = self.bridged(Command) else { return false };
+        let [least, most] = [f64::min, f64::max].map(|of| command.iter().copied().fold(command[0], of));
+        self.jumps().into_iter().any(|k| (command[k] - command[k - 1]).abs() > FAR * (most - least))
+    }
+
+    /// Samples that show a jump of the command: after more than twice as fast a change as goes before and comes after.
+    fn jumps(&self) -> BTreeSet<usize> {
+        let Some(command) = self.bridged(Command) else { return BTreeSet::new() };
+        let rate = |k: usize| (command[k] - command[k - 1]).abs() / (self.time[k] - self.time[k - 1]);
+        let jumps = |k: &usize| {
+            let before = if *k > 1 { rate(k - 1) } else { 0.0 };
+            let after = if k + 1 < command.len() { rate(k + 1) } else { 0.0 };
+            rate(*k) > 2.0 * before.max(after)
+        };
+        (1..command.len()).filter(jumps).collect()
     }
 
     /// The same along straight lines, but for jumps of the command: these are over in the middle between their samples, or else
-    /// begin there; where samples were left out, they are that much less off. A jump is more than twice as fast as what goes before and after.
+    /// begin there; where samples were left out, they are that much less off. Jumps at samples are not in doubt.
     pub fn with_jumps(&self, early: bool) -> Self {
-        let rate = |values: &[f64], k: usize| (values[k + 1] - values[k]).abs() / (self.time[k + 1] - self.time[k]);
-        let jumps = |values: &[f64], k: usize| {
-            let before = if k > 0 { rate(values, k - 1) } else { 0.0 };
-            let after = if k + 2 < values.len() { rate(values, k + 1) } else { 0.0 };
-            rate(values, k) > 2.0 * before.max(after)
-        };
+        let jumps = self.jumps();
         self.with_middles(|signal, values, k| {
             let line = 0.5 * (values[k] + values[k + 1]);
-            let is_doubtful = signal == Command && jumps(values, k);
-            let end = values[if early { k + 1 } else { k }];
-            if is_doubtful { line + (end - line) / self.every as f64 } else { line }
+            match signal == Command && jumps.contains(&(k + 1)) {
+                true if self.late_jumps => values[k],
+                true => line + (values[if early { k + 1 } else { k }] - line) / self.every as f64,
+                false => line,
+            }
         })
     }
 
@@ -541,6 +606,33 @@ mod tests {
         let gap = |k: usize| if k > 5 { k + 7 } else { k } as f64;
         let [early, late] = middles(gap, gap);
         assert_eq!(early, late);
+    }
+
+    #[test]
+    fn a_late_jump_comes_at_the_sample_that_shows_it() {
+        let text = rows("time [s],command [V],contraction [mm]", |k| {
+            format!("{k},{},{k}", if k < 5 { 1.0 } else { 3.0 + 0.1 * k as f64 })
+        });
+        let late = parse(&text).unwrap().with_late_jumps();
+        let (command, arriving) = (late.bridged(Command).unwrap(), late.arriving_command().unwrap());
+        let differ: Vec<usize> = (0..12).filter(|&k| command[k] != arriving[k]).collect();
+        assert_eq!((differ, arriving[5]), (vec![5], 1.0));
+        for between in [late.doubled(), late.with_jumps(true), late.with_jumps(false)] {
+            assert_eq!(between.get(Command).unwrap()[9], 1.0);
+            assert_eq!(between.jumps().into_iter().collect::<Vec<_>>(), [10]);
+        }
+    }
+
+    #[test]
+    fn thinning_keeps_the_sample_of_a_late_jump() {
+        let time: Vec<f64> = (0..4000).map(|k| 1e-3 * f64::from(k)).collect();
+        let command = time.iter().map(|t| if *t < 1.9985 { 1.0 } else { 3.0 }).collect();
+        let recording = Recording::planned("r", time, BTreeMap::from([(Command, command)])).with_late_jumps();
+        let thinned = recording.thinned(4e-3);
+        let jumps = thinned.late_jumps();
+        assert_eq!(jumps.iter().map(|k| thinned.time[*k]).collect::<Vec<_>>(), [1.999]);
+        assert!(thinned.get(Command).unwrap().iter().all(|command| [1.0, 3.0].contains(command)));
+        assert_eq!(thinned.time.len(), 1001);
     }
 
     #[test]

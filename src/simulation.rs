@@ -75,7 +75,7 @@ const AT_REST: (f64, f64) = (2.0, 1.0);
 /// Share of its span within which a command is held.
 const HELD: f64 = 1e-3;
 
-/// Simulates an experiment with its recorded inputs, which are joined by straight lines.
+/// Simulates an experiment with its recorded inputs, which are joined by straight lines, but for jumps [at samples](Recording::with_late_jumps).
 ///
 /// With a hanging load the input is the command; without, it is the contraction with the command or, where there is
 /// none, with the measured pressure. Measured inputs are what the sensors showed: the effects on the sensors are undone.
@@ -126,10 +126,12 @@ fn replay_chain(
         return known.get_or(&parameters, || replay_pull(&parameters, recording, accuracy));
     };
     parameters.initial.gauge_pressure = initial_pressure(&parameters, recording, &command);
+    let arriving = recording.arriving_command().unwrap_or_default();
     let time = &recording.time;
     if let Some(mass) = recording.load_mass() {
         parameters.load.mass = mass;
-        let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
+        let inputs = [&command, &arriving]
+            .map(|command| move |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 });
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
         let [plant, sensors] = parameters.effects.apart();
         let plant = Parameters { effects: plant, ..parameters };
@@ -137,11 +139,14 @@ fn replay_chain(
         return Ok(known.get_or(&plant, follow)?.seen_by(&sensors, time));
     }
     let motion = Motion::of(&parameters, recording);
-    let inputs = |k: usize, pull: f64| ActuatorInputs {
-        command: command[k],
-        contraction: motion.contraction(k, pull),
-        contraction_velocity: motion.velocity[k],
-    };
+    let motion = &motion;
+    let inputs = [&command, &arriving].map(|command| {
+        move |k: usize, pull: f64| ActuatorInputs {
+            command: command[k],
+            contraction: motion.contraction(k, pull),
+            contraction_velocity: motion.velocity[k],
+        }
+    });
     let given = [Signal::Contraction];
     let follow =
         || follow::<PneumaticActuator>(&parameters, time, accuracy, inputs, driven_readings, motion.pull(), &given);
@@ -180,7 +185,15 @@ fn replay_pull(parameters: &Parameters, recording: &Recording, accuracy: Accurac
         contraction_velocity: motion.velocity[k],
     };
     let given = [Signal::Contraction, Signal::GaugePressure];
-    follow::<MuscleAlone>(parameters, &recording.time, accuracy, inputs, driven_readings, motion.pull(), &given)
+    follow::<MuscleAlone>(
+        parameters,
+        &recording.time,
+        accuracy,
+        [&inputs, &inputs],
+        driven_readings,
+        motion.pull(),
+        &given,
+    )
 }
 
 /// Gauge pressure in Pa at the start of a recording.
@@ -314,12 +327,13 @@ fn driven_readings(out: &ActuatorOutputs) -> [f64; 3] {
 
 /// Simulates a system whose inputs are joined by straight lines between the given times.
 ///
-/// `inputs` are those at a sample while the muscle pulls with some force in N; where they depend on it, `pull` tells it.
+/// The inputs are those at a sample while the muscle pulls with some force in N, and those that the lines lead to there, which differ where
+/// they jump; where they depend on the force, `pull` tells it.
 fn follow<S: System>(
     parameters: &Parameters,
     time: &[f64],
     accuracy: Accuracy,
-    inputs: impl Fn(usize, f64) -> S::Inputs,
+    [inputs, arriving]: [impl Fn(usize, f64) -> S::Inputs; 2],
     shown: impl Fn(&S::Outputs) -> [f64; 3],
     pull: Option<fn(&S::Outputs) -> f64>,
     given: &[Signal],
@@ -350,7 +364,7 @@ fn follow<S: System>(
         let resting = (k + 1..time.len()).take_while(|&next| may_skip && inputs(next, 0.0) == simulator.inputs).count();
         let next = k + resting.max(1);
         let span = time[next] - time[k];
-        let difference = inputs(next, force).along(&simulator.inputs, -1.0);
+        let difference = arriving(next, force).along(&simulator.inputs, -1.0);
         simulator.slopes = S::Inputs::default().along(&difference, 1.0 / span);
         let between: Vec<f64> = time[k + 1..next].iter().map(|time_between| time_between - time[k]).collect();
         simulator.advance_past(span, &between, &mut |outputs| replay.push(shown(&outputs)))?;
@@ -551,7 +565,31 @@ mod tests {
         let command = command(60);
         let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
-        follow::<PneumaticMuscle>(parameters, &time(), Accuracy::USUAL, inputs, shown, None, &[]).unwrap()
+        follow::<PneumaticMuscle>(parameters, &time(), Accuracy::USUAL, [inputs, inputs], shown, None, &[]).unwrap()
+    }
+
+    #[test]
+    fn a_valve_answers_a_late_jump_from_its_sample_on() {
+        // Of first order: p = p∞ + (p₀ − p∞) exp(−ω (t − t₀)).
+        const JUMP: usize = 20;
+        let command = |k: usize| if k < JUMP { 2.0 } else { 3.0 };
+        let mut text = "time [s],command [V],contraction [mm],load_mass [kg]\n".to_owned();
+        for k in 0..60 {
+            text += &format!("{:.2},{},100,20\n", PERIOD * k as f64, command(k));
+        }
+        let recording = Recording::parse(text.as_bytes(), std::path::Path::new("jump.csv"), &[]).unwrap();
+        let parameters = Parameters::default();
+        let pressure = |recording: &Recording| {
+            replay(&parameters, recording).unwrap().get(Signal::GaugePressure).unwrap().to_vec()
+        };
+        let late = pressure(&recording.with_late_jumps());
+        for (k, pressure) in late.iter().enumerate() {
+            let after = PERIOD * k.saturating_sub(JUMP) as f64;
+            let expected = 3e5 - 1e5 * (-parameters.valve.bandwidth * after).exp();
+            assert!((pressure - expected).abs() < 1.0, "{k}: {pressure} {expected}");
+        }
+        // Along a straight line from the sample before it begins earlier.
+        assert!(pressure(&recording)[JUMP] > late[JUMP] + 5e3);
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! The diagnosis on recordings made by an independent program (`data/generate.py`), and on spoilt ones.
 
 use sinew::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, Verdict, diagnose};
-use sinew::measurement::Signal::{Command, Contraction, Force};
+use sinew::measurement::Signal::{Command, Contraction, Force, GaugePressure};
 use sinew::measurement::{Recording, numbered};
 use sinew::parameters::Parameters;
-use sinew::simulation::slopes;
+use sinew::simulation::{replay, slopes};
 use std::path::Path;
 
 /// A shipped recording, every cell changed by a function of its row, its column's name and its text.
@@ -47,6 +47,35 @@ fn nothing_is_wrong_where_nothing_is() {
         let found = diagnosis_of(&[as_it_is(name)]);
         assert_eq!((found.verdict, causes(&found)), (Verdict::Nominal, vec![]), "{name}");
     }
+}
+
+/// Three levels of a command in turn, one each two seconds and a bit, and ramps between them in the second half.
+fn stairs_and_ramps(time: f64) -> f64 {
+    let level = |step: f64| [1.6, 2.0, 1.8, 2.4, 2.1][step.rem_euclid(5.0) as usize];
+    let (step, after) = ((time / 2.2).floor(), time / 2.2 % 1.0);
+    if time < 13.0 { level(step) } else { level(step) + (level(step + 1.0) - level(step)) * (2.0 * after).min(1.0) }
+}
+
+#[test]
+fn a_command_that_jumps_at_its_samples_is_no_cause() {
+    // A program that sets the command and logs it: with straight lines between samples each step would begin 20 ms too early.
+    let text = |shown: &dyn Fn(usize) -> String| {
+        let row =
+            |k: usize| format!("{:.2},{:.5},{},40\n", 0.02 * k as f64, stairs_and_ramps(0.02 * k as f64), shown(k));
+        let header = "time [s],command [V],gauge_pressure [bar],contraction [mm],load_mass [kg]\n".to_owned();
+        (0..1300).fold(header, |text, k| text + &row(k))
+    };
+    let parsed = |text: String| Recording::parse(text.as_bytes(), Path::new("jumps.csv"), &[]).unwrap();
+    let inputs = parsed(text(&|_| "1,100".to_owned())).with_late_jumps();
+    let truth = replay(&Parameters::default(), &inputs).unwrap();
+    let [pressure, contraction] = [GaugePressure, Contraction].map(|signal| truth.get(signal).unwrap());
+    let noise = |k: usize, by: f64| ((k * k) as f64 * by).sin() + ((k * k) as f64 * 1.7 * by).cos();
+    let shown = |k: usize| {
+        let bar = 1e-5 * pressure[k] + 0.003 * noise(k, 0.71);
+        format!("{bar:.4},{:.3}", 1e3 * contraction[k] + 0.05 * noise(k, 0.37))
+    };
+    let found = diagnosis_of(&[parsed(text(&shown))]);
+    assert_eq!((found.verdict, causes(&found), found.jumps_at_samples), (Verdict::Nominal, vec![], true));
 }
 
 #[test]

@@ -118,6 +118,8 @@ pub type Changes = Recent<Vec<f64>>;
 pub struct Bench<'a> {
     /// The recordings.
     pub data: Data<'a>,
+    /// How the nominal model may be off.
+    pub off: Off,
     nominal: &'a Parameters,
     /// Corrections with their bounds and priors.
     corrections: Vec<(&'static Variable, Free)>,
@@ -135,7 +137,7 @@ impl<'a> Bench<'a> {
     pub fn new(data: Data<'a>, nominal: &'a Parameters, tolerance: f64, off: Off, changes: &'a Changes) -> Self {
         let corrections = corrections(nominal, tolerance, off);
         let weights = data.weights(Scope::All);
-        Self { data, nominal, corrections, slopes: Slopes::default(), weights, recent: Recent::new(KEPT), changes }
+        Self { data, off, nominal, corrections, slopes: Slopes::default(), weights, recent: Recent::new(KEPT), changes }
     }
 
     /// Takes what a better model shows of the noise.
@@ -177,6 +179,12 @@ impl<'a> Bench<'a> {
     /// The same with slopes from nearby, be it also of parameters of effects: an iteration costs one simulation per other parameter.
     pub fn rough_fit_with(&self, slopes: &Slopes, hypothesis: &Hypothesis, start: &Parameters) -> Option<Fitted> {
         self.fit(hypothesis, start, Scope::All, slopes, ROUGH)
+    }
+
+    /// The same from a fit to recordings that were taken in another way; what the corrections do is looked at there.
+    pub fn rough_fit_again(&self, fitted: &Fitted) -> Option<Fitted> {
+        let slopes = self.slopes_at(&Hypothesis::default(), &fitted.parameters)?;
+        self.rough_fit_with(&slopes, &fitted.hypothesis, &fitted.parameters)
     }
 
     /// Fits a hypothesis to the end on the samples in scope, starting from a model that is about right. What the
@@ -643,7 +651,7 @@ fn weighted(residuals: &[f64], weights: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::{INTEGRATION, thinned};
+    use crate::diagnosis::timing::{INTEGRATION, thinned};
     use crate::effects::Effects;
     use crate::measurement::read_all;
     use crate::simulation::replay_within;

@@ -16,6 +16,7 @@ mod remaining;
 pub mod report;
 mod residuals;
 mod selection;
+mod timing;
 mod unlisted;
 mod ways;
 
@@ -25,31 +26,24 @@ pub use remaining::Remaining;
 pub use residuals::HeldOut;
 
 use crate::Result;
-use crate::integrator::Accuracy;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality;
 use crate::variables::Declared;
-use fits::{Bench, Changes, Fitted};
-use hypothesis::{Off, Part, recording_of};
+use fits::{Bench, Fitted};
+use hypothesis::{Part, recording_of};
 use residuals::{Data, Scope};
-use selection::{Chosen, Judged, MOST_EFFECTS};
+use selection::{Chosen, Judged};
 use serde::Serialize;
+use timing::Taken;
 use unlisted::Shown;
-use ways::Way;
 
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
 
-/// Seconds between samples that fits use, about: two hundred a second resolve the fastest effect, and more only take longer.
-/// Of long recordings a hundred do, where more would be above [`MANY_SAMPLES`] in all.
-const PERIODS: (f64, f64) = (5e-3, 1e-2);
-const MANY_SAMPLES: f64 = 13e3;
-
-/// Accuracy of the integration in fits. Ten times the tolerance is far below all noise, too, but makes derivatives by differences so rough
-/// that fits of dry friction get stuck; with [`Accuracy::USUAL`] it takes half as long again. No start of an effect takes as
-/// many steps a second; a cable beside stiff friction took 16 s for one recording, and nothing came of it.
-const INTEGRATION: Accuracy = Accuracy { tolerance: 1e-7, most_steps: 3e4 };
+/// What a person should know where the command jumps at samples.
+const JUMPS_AT_SAMPLES: &str = "the command jumps at the samples that first show it: simulated so, the same causes explain far more than \
+                                with straight lines from the samples before; hold it until then when another tool replays the recording";
 
 /// What the recordings say of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -138,6 +132,8 @@ pub struct Diagnosis {
     pub ranking: Vec<Ranked>,
     /// The extended model: the nominal one with corrections within the tolerance and the named cause.
     pub extended: Parameters,
+    /// Whether the command jumps at the samples that show it, and not on the way there: that explains the data better.
+    pub jumps_at_samples: bool,
     /// Corrections of the nominal model that were fitted along.
     pub corrections: Vec<FittedParameter>,
     /// Where the cause is unknown: a smooth correction without one, which explains nothing. No part of `extended`.
@@ -146,6 +142,14 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// What the error that is left goes with.
     pub remaining: Vec<Remaining>,
+}
+
+impl Diagnosis {
+    /// Recordings as they are simulated: with jumps of the command where they were found to be.
+    pub fn taken(&self, recordings: &[Recording]) -> Vec<Recording> {
+        let taken = |r: &Recording| if self.jumps_at_samples { r.with_late_jumps() } else { r.clone() };
+        recordings.iter().map(taken).collect()
+    }
 }
 
 /// Diagnoses recordings against a nominal model.
@@ -164,29 +168,10 @@ pub fn diagnose(
 ) -> Result<Diagnosis> {
     let notes = quality::notes(recordings, nominal)?;
     let cannot_follow = || residuals::cannot_follow(recordings);
-    let data = Data::new(recordings, nominal, tolerance)?; // a model that cannot be simulated at all is the user's to mend
-    let thinned = thinned(recordings);
-    // A single way asks for each once.
-    let changes = Changes::new(if Off::ways(nominal).len() > 1 { usize::MAX } else { 0 });
-    let prepared = |off: &Off| {
-        let mut for_fits = Data::new(&thinned, nominal, tolerance)?;
-        for_fits.integration = INTEGRATION;
-        for_fits.doubt_starts(nominal);
-        let bench = Bench::new(for_fits, nominal, tolerance, *off, &changes);
-        Way::new(bench, *off == Off::most(nominal)).ok_or_else(cannot_follow)
-    };
-    let found = match Off::ways(nominal) {
-        [narrow, wide] => ways::better(prepared(narrow)?, || prepared(wide), fitting)?,
-        ways => prepared(&ways[0])?.searched(MOST_EFFECTS, fitting),
-    }
-    .ok_or_else(cannot_follow)?;
+    let late: Vec<Recording> = recordings.iter().map(Recording::with_late_jumps).collect();
+    let [on_the_way, at_samples] = [recordings, &late].map(|taken| Taken::new(taken, nominal, tolerance));
+    let (found, data) = timing::better(&on_the_way, &at_samples, fitting)?;
     answer(found.bench(), data, nominal, &found.chosen, notes).ok_or_else(cannot_follow)
-}
-
-/// The recordings with as many samples as fits need.
-fn thinned(recordings: &[Recording]) -> Vec<Recording> {
-    let period = recordings.iter().map(Recording::duration).sum::<f64>() / MANY_SAMPLES;
-    recordings.iter().map(|recording| recording.thinned(period.clamp(PERIODS.0, PERIODS.1))).collect()
 }
 
 /// The choice in words and figures, its errors on all samples.
@@ -202,6 +187,10 @@ fn answer(
             "the fit saw all samples: the first ones do not tell the size of the cause, or not precisely enough"
                 .to_owned(),
         );
+    }
+    let jumps_at_samples = data.recordings().iter().any(Recording::jumps_late);
+    if jumps_at_samples {
+        notes.push(JUMPS_AT_SAMPLES.to_owned());
     }
     let nominal_residuals = data.residuals(nominal)?;
     let mut left = data.residuals(&chosen.model.parameters)?;
@@ -241,6 +230,7 @@ fn answer(
         saw_all: chosen.saw_all,
         ranking: chosen.singles.iter().map(baseline).collect(),
         extended,
+        jumps_at_samples,
         corrections,
         notes,
         remaining: unlisted(bench, chosen).into_iter().chain(remaining::remaining(&data, &extended, &left)).collect(),

@@ -30,6 +30,16 @@ impl<'a> Way<'a> {
         Some(Self { bench, baseline, allows_most })
     }
 
+    /// The hypotheses' fits.
+    pub fn bench(&self) -> &Bench<'a> {
+        &self.bench
+    }
+
+    /// The nominal model with its corrections.
+    pub fn baseline(&self) -> &Fitted {
+        &self.baseline
+    }
+
     /// Whether no more is left than a sound model may leave.
     fn says_all(&self) -> bool {
         !is_unsound(&self.baseline.losses, &self.bench.data)
@@ -45,47 +55,65 @@ impl<'a> Way<'a> {
     }
 }
 
-/// What was found in the better one of two ways, of which the second allows more and is prepared where it is needed; `None` where a model
-/// cannot be simulated.
-///
-/// # Errors
-/// Those of preparing the second one.
-pub fn better<'a>(
-    narrow: Way<'a>,
-    wide: impl Fn() -> Result<Way<'a>>,
-    fitting: &'a Fitting<'a>,
-) -> Result<Option<Found<'a>>> {
-    let at_once = if narrow.says_all() { None } else { Some(wide()?) };
-    // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
-    let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
-    let mut narrow = narrow.looked_over(fitting);
-    if at_once.is_none() {
-        let Some(found) = Found::of(narrow, 1) else { return Ok(None) };
-        if found.finds_nothing() {
-            return Ok(Some(found));
+/// The better one of two ways, of which the second allows more: what is known of the first one's single effects, before either is searched.
+pub struct Begun<'a> {
+    narrow: Search<'a>,
+    /// The second one, where the first one's coefficients do not say all.
+    at_once: Option<Way<'a>>,
+}
+
+impl<'a> Begun<'a> {
+    /// Looks over the first way's single effects; the second way is prepared where it is needed.
+    ///
+    /// # Errors
+    /// Those of preparing the second one.
+    pub fn of(narrow: Way<'a>, wide: impl Fn() -> Result<Way<'a>>, fitting: &'a Fitting<'a>) -> Result<Self> {
+        let at_once = if narrow.says_all() { None } else { Some(wide()?) };
+        Ok(Self { narrow: narrow.looked_over(fitting), at_once })
+    }
+
+    /// The first way's fits, not refined, and those of its single effects, the best first.
+    pub fn singles(&self) -> (&Bench<'a>, impl Iterator<Item = &Fitted>) {
+        (&self.narrow.bench, self.narrow.singles().iter().map(|single| &single.fitted))
+    }
+
+    /// What was found; `None` where a model cannot be simulated.
+    ///
+    /// # Errors
+    /// Those of preparing the second way.
+    pub fn better(self, wide: impl Fn() -> Result<Way<'a>>, fitting: &'a Fitting<'a>) -> Result<Option<Found<'a>>> {
+        let Self { mut narrow, at_once } = self;
+        // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
+        let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
+        if at_once.is_none() {
+            let Some(found) = Found::of(narrow, 1) else { return Ok(None) };
+            if found.finds_nothing() {
+                return Ok(Some(found));
+            }
+            narrow = found.search;
         }
-        narrow = found.search;
-    }
-    let mut wide = at_once.map_or_else(wide, Ok)?.looked_over(fitting);
-    if let Some(wins) = wins_alone(&mut narrow, &mut wide) {
-        let winner = if wins { &mut narrow } else { &mut wide };
-        if let Some(chosen) = winner.up_to(1).filter(Chosen::names_causes) {
-            return Ok(Some(Found { search: if wins { narrow } else { wide }, chosen }));
+        let mut wide = at_once.map_or_else(wide, Ok)?.looked_over(fitting);
+        if let Some(wins) = wins_alone(&mut narrow, &mut wide) {
+            let winner = if wins { &mut narrow } else { &mut wide };
+            if let Some(chosen) = winner.up_to(1).filter(Chosen::names_causes) {
+                return Ok(Some(Found { search: if wins { narrow } else { wide }, chosen }));
+            }
         }
+        let Some(mut found) = Found::of(narrow, most.min(AT_FIRST)) else { return Ok(None) };
+        let Some(mut other) = Found::of(wide, found.most_beside().min(AT_FIRST)) else { return Ok(None) };
+        // Where another cause leads than was found, as many may be others.
+        if other.search.leads_away_from(&found.chosen.best.hypothesis) {
+            other.up_to(found.best().causes().min(AT_FIRST));
+        }
+        // A third one takes minutes to find, and none is missing where two say all.
+        if !other.best().says_all() {
+            found.up_to(most);
+            other.up_to(found.most_beside());
+        }
+        let wins =
+            found.best().beats(&other.best()) && other.refused().is_none_or(|refused| found.best().beats(&refused));
+        Ok(Some(if wins { found } else { other }))
     }
-    let Some(mut found) = Found::of(narrow, most.min(AT_FIRST)) else { return Ok(None) };
-    let Some(mut other) = Found::of(wide, found.most_beside().min(AT_FIRST)) else { return Ok(None) };
-    // Where another cause leads than was found, as many may be others.
-    if other.search.leads_away_from(&found.chosen.best.hypothesis) {
-        other.up_to(found.best().causes().min(AT_FIRST));
-    }
-    // A third one takes minutes to find, and none is missing where two say all.
-    if !other.best().says_all() {
-        found.up_to(most);
-        other.up_to(found.most_beside());
-    }
-    let wins = found.best().beats(&other.best()) && other.refused().is_none_or(|refused| found.best().beats(&refused));
-    Ok(Some(if wins { found } else { other }))
 }
 
 /// Whether the single effect that looks best beats the one of a way that allows more, where that one leaves nothing, and neither does the
@@ -116,6 +144,16 @@ impl<'a> Found<'a> {
     /// The hypotheses' fits.
     pub fn bench(&self) -> &Bench<'a> {
         &self.search.bench
+    }
+
+    /// The best fit to all samples.
+    pub fn best_fit(&self) -> &Fitted {
+        &self.chosen.best
+    }
+
+    /// Whether one cause or none leaves no more than a sound model may.
+    pub fn leaves_nothing_by_one(&self) -> bool {
+        self.best().causes() <= 1 && self.best().says_all()
     }
 
     /// Its best fit to all samples.

@@ -118,7 +118,7 @@ def main():
     truths = wanted_truths(options.effects, options.cases, options.seed, known)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        kind = Kind(options.severity, session=options.session)
+        kind = Kind(options.severity, session=options.session, edges=options.edges)
         names = write_cases(truths, kind, options.seed, folder, options.jobs, visible=False)
         warm_up(folder, names)
         ways, lines = compare(folder, names, options.sinew)

@@ -88,6 +88,7 @@ class Kind:
     severity: float = 1.0
     same_form: bool = False
     session: Session = USUAL
+    edges: str | None = None  # one of EDGES for all cases; None: drawn
 
 
 @dataclass
@@ -98,6 +99,7 @@ class Plan:
     mass: float | None
     columns: tuple
     excitation: str
+    edges: str
     rate: float
     jitter: float
 
@@ -173,22 +175,34 @@ def multisine(random, duration):
 EXCITATIONS = {"staircase": staircase, "ramps": ramps, "multisine": multisine, "random_steps": random_steps}
 
 
-def course(random, excitation, duration):
-    """A share of the range over time: a second of rest, then the excitation, its corners rounded over 0.1 s."""
+# How the command turns: its corners rounded over 0.1 s by a filter; sharp, at any time, as where a logger runs by
+# itself; sharp, steps at samples, as where one program sets and logs the command; held from sample to sample, ramps
+# too, as by a digital controller that logs (only on request).
+EDGES = ("rounded", "sharp", "at_samples", "held")
+EDGES_SHARES = (0.6, 0.2, 0.2, 0.0)
+
+
+def course(random, excitation, duration, edges, rate):
+    """A share of the range over time: a second of rest, then the excitation."""
     share = EXCITATIONS[excitation](random, duration)
     share = np.concatenate([np.full(round(1 / STEP), share[0]), share])
-    return uniform_filter1d(share, round(0.1 / STEP), mode="nearest")
+    if edges == "rounded":
+        return uniform_filter1d(share, round(0.1 / STEP), mode="nearest")
+    if edges == "held" or edges == "at_samples" and excitation in ("staircase", "random_steps"):
+        per_sample = round(1 / (rate * STEP))
+        return share[np.arange(len(share)) // per_sample * per_sample]
+    return share
 
 
-def hanging_command(random, excitation, duration, mass, reach):
+def hanging_command(course, mass, reach):
     middle, half = np.mean(CONTRACTION), reach * np.ptp(CONTRACTION) / 2
-    wanted = middle + half * (2 * course(random, excitation, duration) - 1)
+    wanted = middle + half * (2 * course - 1)
     return holding_pressure(wanted, mass) / VALVE_GAIN
 
 
 def imposed_motion(random, duration):
     """A testing machine: strokes at several rates, starting gently."""
-    share = course(random, random.choice(["ramps", "multisine"]), duration)
+    share = course(random, random.choice(["ramps", "multisine"]), duration, "rounded", None)
     return uniform_filter1d(0.03 + 0.15 * share, round(0.3 / STEP), mode="nearest")
 
 
@@ -272,27 +286,31 @@ def draw_case(random, truth, kind):
     hidden = draw_hidden(random, effects, kind)
     specimen, noise = draw_specimen(random, kind.same_form), draw_noise(random)
     rate, jitter = random.choice(kind.session.rates), random.choice([0.0, random.uniform(0.02, 0.2)])
+    edges = kind.edges or str(random.spawn(1)[0].choice(EDGES, p=EDGES_SHARES))
+    jitter = jitter if edges in ("rounded", "sharp") else 0.0
     relaxed = bool(random.random() < 0.5) or kind.same_form
     excitations = [random.choice(list(EXCITATIONS)) for _ in masses]
     both = list(zip(masses, excitations, strict=True))
-    bare = [draw_experiment(random, mass, excitation, kind.session.seconds) for mass, excitation in both]
+    session = replace(kind.session, rates=(rate,))
+    bare = [draw_experiment(random, mass, excitation, session, edges) for mass, excitation in both]
     hidden = tuple((form, form.suited(size, bare)) for form, size in hidden)
     case = Case(effects, kind, hidden, specimen, noise)
     for number, (experiment, excitation) in enumerate(zip(bare, excitations, strict=True)):
         here = tuple((form, form.in_recording(size, number)) for form, size in hidden)
         full = replace(experiment, specimen=specimen, hidden=here, relaxed=relaxed)
-        case.plans.append(Plan(full, experiment.mass, columns, str(excitation), float(rate), float(jitter)))
+        case.plans.append(Plan(full, experiment.mass, columns, str(excitation), edges, float(rate), float(jitter)))
     return case
 
 
-def draw_experiment(random, mass, excitation, seconds):
+def draw_experiment(random, mass, excitation, session, edges):
     """Without specimen and effects, as yet."""
-    duration = random.uniform(*seconds)
+    duration = random.uniform(*session.seconds)
     if mass is None:
         low, high = random.uniform(0.8, 1.5), random.uniform(2.5, 4.5)
-        command = low + (high - low) * course(random, excitation, duration)
+        command = low + (high - low) * course(random, excitation, duration, edges, session.rates[0])
         return Experiment(Specimen(), command, motion=imposed_motion(random, duration))
-    command = hanging_command(random, excitation, duration, mass, random.uniform(0.6, 1.0))
+    reach = random.uniform(0.6, 1.0)
+    command = hanging_command(course(random, excitation, duration, edges, session.rates[0]), mass, reach)
     return Experiment(Specimen(), command, mass)
 
 
@@ -417,7 +435,7 @@ def write_case(random, name, case, runs, out):
         "specimen": vars(case.specimen),
         "relaxed": case.plans[0].experiment.relaxed,
         "recordings": [
-            {"load_mass": p.mass, "excitation": p.excitation, "columns": p.columns, "rate": p.rate, "jitter": p.jitter}
+            {"load_mass": p.mass, **{of: getattr(p, of) for of in ("excitation", "edges", "columns", "rate", "jitter")}}
             for p in case.plans
         ],
         "noise": case.noise,
@@ -498,6 +516,9 @@ def add_options(parser):
         help="separated by commas, each with :COUNT: names, ONE+OTHER, none; known and unknown (each of them);"
         " any-known, any-unknown and pairs (that many drawn at random)",
     )
+    parser.add_argument(
+        "--edges", choices=EDGES, help="how the command turns; default: rounded in six of ten cases, else sharp"
+    )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side")
     parser.add_argument(
         "--long",
@@ -518,7 +539,7 @@ def main():
     add_options(parser)
     options = parser.parse_args()
     truths = wanted_truths(options.effects, options.cases, options.seed)
-    kind = Kind(options.severity, options.same_form, options.session)
+    kind = Kind(options.severity, options.same_form, options.session, options.edges)
     write_cases(truths, kind, options.seed, options.out, options.jobs)
 
 

@@ -228,7 +228,8 @@ def print_failures(score):
     print("Not right:")
     for o in score.outcomes:
         if not score.is_right(o):
-            recordings = [(r["load_mass"], r["excitation"], *r["columns"]) for r in o.detail["recordings"]]
+            shown_of = ("load_mass", "excitation", "edges")
+            recordings = [(*map(r.get, shown_of), *r["columns"]) for r in o.detail["recordings"]]
             shows = f" visibility {' and '.join(f'{value:.1f}' for value in shown(o))}," if shown(o) else ""
             hidden = f"{o.truth}/{'+'.join(o.detail['forms'])}" + (f" ({o.near_or_far})" if o.near_or_far else "")
             print(f"  {o.name} {hidden} -> {o.answer} ({o.verdict}),{shows} {recordings}")

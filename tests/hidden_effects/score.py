@@ -45,7 +45,7 @@ def fresh_seed():
 def wanted_runs(options):
     severities = [float(severity) for severity in options.severity.split(",")]
     same_form = {None: [False], "beside": [False, True], "only": [True]}[options.same_form]
-    return [Run(severity, same, options.session) for severity in severities for same in same_form]
+    return [Run(severity, same, options.session, options.edges) for severity in severities for same in same_form]
 
 
 def score_run(run, options, seed, known, folder):

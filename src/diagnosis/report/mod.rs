@@ -108,6 +108,7 @@ pub fn files(
     libraries: &[Library],
     folder: &Path,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>> {
+    let recordings = &diagnosis.taken(recordings);
     let extended = &diagnosis.extended;
     let both = |recording: &Recording| Ok([replay(nominal, recording)?, replay(extended, recording)?]);
     let replays = recordings.par_iter().map(both).collect::<Result<Vec<_>>>()?;

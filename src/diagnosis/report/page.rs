@@ -273,6 +273,7 @@ mod tests {
             saw_all: false,
             ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2, parameters: Vec::new() }],
             extended: Parameters::default(),
+            jumps_at_samples: false,
             corrections: vec![correction],
             notes: vec!["<b>bold</b>".to_owned()],
             remaining: vec![Remaining {

@@ -141,6 +141,11 @@ impl<'a> Search<'a> {
         search
     }
 
+    /// The single effects that are fitted so far, the best first.
+    pub fn singles(&self) -> &[Judged] {
+        &self.levels[0]
+    }
+
     /// Fits those single effects, too, that promise less. One of them may be the best, and tell the noise.
     fn complete(&mut self) {
         let (mut all, others) = (std::mem::take(&mut self.levels[0]), std::mem::take(&mut self.unfitted));
