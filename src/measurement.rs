@@ -270,7 +270,7 @@ impl Recording {
         let picked = |values: &[f64]| kept().map(|k| values[k]).collect();
         let mean = |values: &[f64], centre: usize| {
             let near = centre.saturating_sub(every - 1)..(centre + every).min(values.len());
-            if jumps.iter().any(|jump| near.contains(jump)) {
+            if jumps.range(near.clone()).next().is_some() {
                 return values[centre];
             }
             let present = near.filter(|k| !values[*k].is_nan());
@@ -303,6 +303,20 @@ impl Recording {
         })
     }
 
+    /// The same along straight lines, but for jumps of the command: these are over in the middle between their samples, or else
+    /// begin there; where samples were left out, they are that much less off. Jumps at samples are not in doubt.
+    pub fn with_jumps(&self, early: bool) -> Self {
+        let jumps = self.bridged(Command).map(|command| self.jumps(&command)).unwrap_or_default();
+        self.with_middles(|signal, values, k| {
+            let line = 0.5 * (values[k] + values[k + 1]);
+            match signal == Command && jumps.contains(&(k + 1)) {
+                true if self.late_jumps => values[k],
+                true => line + (values[if early { k + 1 } else { k }] - line) / self.every as f64,
+                false => line,
+            }
+        })
+    }
+
     /// The recording of a command that jumps at the very sample that shows the jump, as where one program sets and logs it, and not somewhere
     /// between that sample and the one before.
     pub fn with_late_jumps(&self) -> Self {
@@ -314,29 +328,30 @@ impl Recording {
         self.late_jumps
     }
 
-    /// The command as it comes to each sample, its gaps bridged: on straight lines from the sample before, but for jumps at the sample itself.
-    pub fn arriving_command(&self) -> Option<Vec<f64>> {
-        let command = self.bridged(Command)?;
-        let mut arriving = command.clone();
-        self.late_jumps().into_iter().for_each(|k| arriving[k] = command[k - 1]);
-        Some(arriving)
+    /// The bridged command as it comes to each sample: on straight lines from the sample before, but for jumps at the sample itself.
+    pub fn arriving(&self, command: &[f64]) -> Vec<f64> {
+        let mut arriving = command.to_vec();
+        if self.late_jumps {
+            self.jumps(command).into_iter().for_each(|k| arriving[k] = command[k - 1]);
+        }
+        arriving
     }
 
     /// Samples at which the command jumps, where it does that at samples.
     fn late_jumps(&self) -> BTreeSet<usize> {
-        if self.late_jumps { self.jumps() } else { BTreeSet::new() }
+        let command = if self.late_jumps { self.bridged(Command) } else { None };
+        command.map(|command| self.jumps(&command)).unwrap_or_default()
     }
 
     /// Whether the command jumps by more than a hundredth of its span.
     pub fn jumps_far(&self) -> bool {
         let Some(command) = self.bridged(Command) else { return false };
         let [least, most] = [f64::min, f64::max].map(|of| command.iter().copied().fold(command[0], of));
-        self.jumps().into_iter().any(|k| (command[k] - command[k - 1]).abs() > FAR * (most - least))
+        self.jumps(&command).into_iter().any(|k| (command[k] - command[k - 1]).abs() > FAR * (most - least))
     }
 
-    /// Samples that show a jump of the command: after more than twice as fast a change as goes before and comes after.
-    fn jumps(&self) -> BTreeSet<usize> {
-        let Some(command) = self.bridged(Command) else { return BTreeSet::new() };
+    /// Samples that show a jump of the bridged command: after more than twice as fast a change as goes before and comes after.
+    fn jumps(&self, command: &[f64]) -> BTreeSet<usize> {
         let rate = |k: usize| (command[k] - command[k - 1]).abs() / (self.time[k] - self.time[k - 1]);
         let jumps = |k: &usize| {
             let before = if *k > 1 { rate(k - 1) } else { 0.0 };
@@ -344,20 +359,6 @@ impl Recording {
             rate(*k) > 2.0 * before.max(after)
         };
         (1..command.len()).filter(jumps).collect()
-    }
-
-    /// The same along straight lines, but for jumps of the command: these are over in the middle between their samples, or else
-    /// begin there; where samples were left out, they are that much less off. Jumps at samples are not in doubt.
-    pub fn with_jumps(&self, early: bool) -> Self {
-        let jumps = self.jumps();
-        self.with_middles(|signal, values, k| {
-            let line = 0.5 * (values[k] + values[k + 1]);
-            match signal == Command && jumps.contains(&(k + 1)) {
-                true if self.late_jumps => values[k],
-                true => line + (values[if early { k + 1 } else { k }] - line) / self.every as f64,
-                false => line,
-            }
-        })
     }
 
     /// The recording with something added to all readings of a signal, in its SI unit.
@@ -614,12 +615,12 @@ mod tests {
             format!("{k},{},{k}", if k < 5 { 1.0 } else { 3.0 + 0.1 * k as f64 })
         });
         let late = parse(&text).unwrap().with_late_jumps();
-        let (command, arriving) = (late.bridged(Command).unwrap(), late.arriving_command().unwrap());
+        let (command, arriving) = (late.bridged(Command).unwrap(), late.arriving(late.get(Command).unwrap()));
         let differ: Vec<usize> = (0..12).filter(|&k| command[k] != arriving[k]).collect();
         assert_eq!((differ, arriving[5]), (vec![5], 1.0));
         for between in [late.doubled(), late.with_jumps(true), late.with_jumps(false)] {
             assert_eq!(between.get(Command).unwrap()[9], 1.0);
-            assert_eq!(between.jumps().into_iter().collect::<Vec<_>>(), [10]);
+            assert_eq!(between.late_jumps().into_iter().collect::<Vec<_>>(), [10]);
         }
     }
 

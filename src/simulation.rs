@@ -126,7 +126,7 @@ fn replay_chain(
         return known.get_or(&parameters, || replay_pull(&parameters, recording, accuracy));
     };
     parameters.initial.gauge_pressure = initial_pressure(&parameters, recording, &command);
-    let arriving = recording.arriving_command().unwrap_or_default();
+    let arriving = recording.arriving(&command);
     let time = &recording.time;
     if let Some(mass) = recording.load_mass() {
         parameters.load.mass = mass;
@@ -138,8 +138,7 @@ fn replay_chain(
         let follow = || follow::<PneumaticMuscle>(&plant, time, accuracy, inputs, shown, None, &[]);
         return Ok(known.get_or(&plant, follow)?.seen_by(&sensors, time));
     }
-    let motion = Motion::of(&parameters, recording);
-    let motion = &motion;
+    let motion = &Motion::of(&parameters, recording);
     let inputs = [&command, &arriving].map(|command| {
         move |k: usize, pull: f64| ActuatorInputs {
             command: command[k],

@@ -49,7 +49,7 @@ fn nothing_is_wrong_where_nothing_is() {
     }
 }
 
-/// Three levels of a command in turn, one each two seconds and a bit, and ramps between them in the second half.
+/// Five levels of a command in turn, one each two seconds and a bit, and ramps between them in the second half.
 fn stairs_and_ramps(time: f64) -> f64 {
     let level = |step: f64| [1.6, 2.0, 1.8, 2.4, 2.1][step.rem_euclid(5.0) as usize];
     let (step, after) = ((time / 2.2).floor(), time / 2.2 % 1.0);
@@ -58,7 +58,7 @@ fn stairs_and_ramps(time: f64) -> f64 {
 
 #[test]
 fn a_command_that_jumps_at_its_samples_is_no_cause() {
-    // A program that sets the command and logs it: with straight lines between samples each step would begin 20 ms too early.
+    // A program that sets the command and logs it: with straight lines between samples each step would come 10 ms too early.
     let text = |shown: &dyn Fn(usize) -> String| {
         let row =
             |k: usize| format!("{:.2},{:.5},{},40\n", 0.02 * k as f64, stairs_and_ramps(0.02 * k as f64), shown(k));

@@ -4,11 +4,10 @@
 
 use super::Fitting;
 use super::fits::{Bench, Changes, Fitted};
-use super::hypothesis::{Hypothesis, Off, Part};
+use super::hypothesis::{Hypothesis, Off};
 use super::residuals::{self, Data, Scope};
-use super::selection::LEAST_EVIDENCE;
-use super::selection::MOST_EFFECTS;
 use super::selection::evidence::{gain, odds};
+use super::selection::{LEAST_EVIDENCE, MOST_EFFECTS};
 use super::ways::{Begun, Found, Way};
 use crate::Result;
 use crate::effects::Effects;
@@ -49,7 +48,7 @@ impl<'r> Taken<'r> {
     /// Recordings against a nominal model that is good to `tolerance`.
     pub fn new(recordings: &'r [Recording], nominal: &'r Parameters, tolerance: f64) -> Self {
         // A single way asks for each once.
-        let changes = Changes::new(if Off::ways(nominal).len() > 1 { usize::MAX } else { 0 });
+        let changes = Changes::new(if is_off_in_two_ways(nominal) { usize::MAX } else { 0 });
         Self { nominal, tolerance, recordings, thinned: thinned(recordings), changes }
     }
 
@@ -70,24 +69,36 @@ impl<'r> Taken<'r> {
         way.ok_or_else(|| residuals::cannot_follow(self.recordings))
     }
 
+    fn first_way(&self) -> Result<Way<'_>> {
+        self.way(Off::ways(self.nominal)[0])
+    }
+
     fn wide_way(&self) -> Result<Way<'_>> {
         self.way(Off::most(self.nominal))
+    }
+
+    fn begun<'a>(&'a self, first: Way<'a>, fitting: &'a Fitting<'a>) -> Result<Begun<'a>> {
+        Begun::of(first, || self.wide_way(), fitting)
+    }
+
+    fn ended<'a>(&'a self, begun: Begun<'a>, fitting: &'a Fitting<'a>) -> Result<Found<'a>> {
+        let found = begun.better(|| self.wide_way(), fitting)?;
+        found.ok_or_else(|| residuals::cannot_follow(self.recordings))
     }
 
     /// What there is to find.
     fn searched<'a>(&'a self, fitting: &'a Fitting<'a>) -> Result<Found<'a>> {
         let first = self.first_way()?;
-        let found = if Off::ways(self.nominal).len() > 1 {
-            Begun::of(first, || self.wide_way(), fitting)?.better(|| self.wide_way(), fitting)?
-        } else {
-            first.searched(MOST_EFFECTS, fitting)
-        };
-        found.ok_or_else(|| residuals::cannot_follow(self.recordings))
+        if is_off_in_two_ways(self.nominal) {
+            return self.ended(self.begun(first, fitting)?, fitting);
+        }
+        first.searched(MOST_EFFECTS, fitting).ok_or_else(|| residuals::cannot_follow(self.recordings))
     }
+}
 
-    fn first_way(&self) -> Result<Way<'_>> {
-        self.way(Off::ways(self.nominal)[0])
-    }
+/// Whether there are two ways in which the coefficients of a nominal model may be off.
+fn is_off_in_two_ways(nominal: &Parameters) -> bool {
+    Off::ways(nominal).len() > 1
 }
 
 /// What is found in recordings with jumps on the way, or at samples where that explains them better; with all samples of these.
@@ -100,31 +111,24 @@ pub fn better<'a>(
     fitting: &'a Fitting<'a>,
 ) -> Result<(Found<'a>, Data<'a>)> {
     let data = on_the_way.data()?; // a model that cannot be simulated at all is the user's to mend
-    if Off::ways(on_the_way.nominal).len() < 2 || !on_the_way.recordings.iter().any(Recording::jumps_far) {
+    if !is_off_in_two_ways(on_the_way.nominal) || !on_the_way.recordings.iter().any(Recording::jumps_far) {
         return Ok((on_the_way.searched(fitting)?, data));
     }
     let way = on_the_way.first_way()?;
-    let others = at_samples.data()?;
-    if !needs_jumps_at_samples(&way, at_samples, &data, &others)? {
-        let begun = Begun::of(way, || on_the_way.wide_way(), fitting)?;
-        if !is_mistimed(&begun, at_samples, &data, &others)? {
-            let found = begun.better(|| on_the_way.wide_way(), fitting)?;
-            let found = found.ok_or_else(|| residuals::cannot_follow(on_the_way.recordings))?;
-            return in_turn((found, data), at_samples, others, fitting);
+    let (others, anew) = (at_samples.data()?, at_samples.bench(way.bench().off)?);
+    if !needs_jumps_at_samples(&way, &anew, &data, &others) {
+        let begun = on_the_way.begun(way, fitting)?;
+        if !is_mistimed(&begun, &anew, &data, &others) {
+            return in_turn((on_the_way.ended(begun, fitting)?, data), at_samples, others, fitting);
         }
     }
     in_turn((at_samples.searched(fitting)?, others), on_the_way, data, fitting)
 }
 
-/// Whether one of the best single effects explains the data far better with jumps at samples.
-fn is_mistimed(begun: &Begun, at_samples: &Taken, data: &Data, others: &Data) -> Result<bool> {
-    let (bench, singles) = begun.singles();
-    let anew = at_samples.bench(bench.off)?;
-    let is_better = |single: &Fitted| {
-        let again = anew.rough_fit_again(single)?;
-        explains_better((data, single), (others, &again))
-    };
-    Ok(singles.take(TRIED).any(|single| is_better(single) == Some(true)))
+/// Whether one of the best single effects explains the data far better with jumps at samples; `anew` fits it there.
+fn is_mistimed(begun: &Begun, anew: &Bench, data: &Data, others: &Data) -> bool {
+    let is_better = |single: &Fitted| explains_better((data, single), (others, &anew.rough_fit_again(single)?));
+    begun.singles().take(TRIED).any(|single| is_better(single) == Some(true))
 }
 
 /// What was found, or what is found where jumps come as in `other`, if the same causes explain the data better there.
@@ -137,7 +141,7 @@ fn in_turn<'a>(
     if found.leaves_nothing_by_one() {
         return Ok((found, data));
     }
-    let best = found.best_fit();
+    let best = &found.chosen.best;
     let fitted = other.bench(found.bench().off)?.exact_fit(&best.hypothesis, &best.parameters, Scope::All);
     if fitted.and_then(|fitted| explains_better((&data, best), (&others, &fitted))) == Some(true) {
         return Ok((other.searched(fitting)?, others));
@@ -145,21 +149,22 @@ fn in_turn<'a>(
     Ok((found, data))
 }
 
-/// Whether jumps at samples explain what the nominal model leaves far better than jumps on the way, and no worse than a dead time would.
-fn needs_jumps_at_samples(way: &Way, at_samples: &Taken, data: &Data, others: &Data) -> Result<bool> {
-    let (bench, baseline) = (way.bench(), way.baseline());
-    let anew = at_samples.bench(bench.off)?;
+/// Whether jumps at samples explain what the nominal model leaves far better than jumps on the way, and no worse than a dead time would;
+/// `anew` fits it there.
+fn needs_jumps_at_samples(way: &Way, anew: &Bench, data: &Data, others: &Data) -> bool {
     let is_needed = || {
+        let (bench, baseline) = (way.bench(), way.baseline());
         let [own, jumping] = losses(data, [(data, baseline), (others, &anew.rough_fit_again(baseline)?)])?;
         if gain(&own, &jumping) <= LEAST_EVIDENCE {
             return Some(false);
         }
-        let late = Hypothesis::default().with(Part::plain(Effects::description("valve_dead_time")?, 0));
-        let start = bench.starts(baseline, late.parts[0].effect).into_iter().next()?.parameters;
-        let [late] = losses(data, [(data, &bench.exact_fit(&late, &start, Scope::All)?)])?;
+        let dead_time = Effects::description("valve_dead_time")?;
+        let start = bench.starts(baseline, dead_time).into_iter().next()?;
+        let late = Hypothesis::default().with(start.part);
+        let [late] = losses(data, [(data, &bench.exact_fit(&late, &start.parameters, Scope::All)?)])?;
         Some(odds(&late, &jumping, -1.0) >= 0.0)
     };
-    Ok(is_needed() == Some(true))
+    is_needed() == Some(true)
 }
 
 /// Whether the second of two fits of the same causes to recordings that were taken in different ways is far better.

@@ -72,9 +72,9 @@ impl<'a> Begun<'a> {
         Ok(Self { narrow: narrow.looked_over(fitting), at_once })
     }
 
-    /// The first way's fits, not refined, and those of its single effects, the best first.
-    pub fn singles(&self) -> (&Bench<'a>, impl Iterator<Item = &Fitted>) {
-        (&self.narrow.bench, self.narrow.singles().iter().map(|single| &single.fitted))
+    /// Fits of the first way's single effects, not refined, the best first.
+    pub fn singles(&self) -> impl Iterator<Item = &Fitted> {
+        self.narrow.singles().iter().map(|single| &single.fitted)
     }
 
     /// What was found; `None` where a model cannot be simulated.
@@ -144,11 +144,6 @@ impl<'a> Found<'a> {
     /// The hypotheses' fits.
     pub fn bench(&self) -> &Bench<'a> {
         &self.search.bench
-    }
-
-    /// The best fit to all samples.
-    pub fn best_fit(&self) -> &Fitted {
-        &self.chosen.best
     }
 
     /// Whether one cause or none leaves no more than a sound model may.

@@ -182,7 +182,7 @@ EDGES = ("rounded", "sharp", "at_samples", "held")
 EDGES_SHARES = (0.6, 0.2, 0.2, 0.0)
 
 
-def course(random, excitation, duration, edges, rate):
+def course(random, excitation, duration, edges="rounded", rate=None):
     """A share of the range over time: a second of rest, then the excitation."""
     share = EXCITATIONS[excitation](random, duration)
     share = np.concatenate([np.full(round(1 / STEP), share[0]), share])
@@ -194,15 +194,15 @@ def course(random, excitation, duration, edges, rate):
     return share
 
 
-def hanging_command(course, mass, reach):
+def hanging_command(share, mass, reach):
     middle, half = np.mean(CONTRACTION), reach * np.ptp(CONTRACTION) / 2
-    wanted = middle + half * (2 * course - 1)
+    wanted = middle + half * (2 * share - 1)
     return holding_pressure(wanted, mass) / VALVE_GAIN
 
 
 def imposed_motion(random, duration):
     """A testing machine: strokes at several rates, starting gently."""
-    share = course(random, random.choice(["ramps", "multisine"]), duration, "rounded", None)
+    share = course(random, random.choice(["ramps", "multisine"]), duration)
     return uniform_filter1d(0.03 + 0.15 * share, round(0.3 / STEP), mode="nearest")
 
 
@@ -291,8 +291,8 @@ def draw_case(random, truth, kind):
     relaxed = bool(random.random() < 0.5) or kind.same_form
     excitations = [random.choice(list(EXCITATIONS)) for _ in masses]
     both = list(zip(masses, excitations, strict=True))
-    session = replace(kind.session, rates=(rate,))
-    bare = [draw_experiment(random, mass, excitation, session, edges) for mass, excitation in both]
+    seconds = kind.session.seconds
+    bare = [draw_experiment(random, mass, excitation, seconds, edges, rate) for mass, excitation in both]
     hidden = tuple((form, form.suited(size, bare)) for form, size in hidden)
     case = Case(effects, kind, hidden, specimen, noise)
     for number, (experiment, excitation) in enumerate(zip(bare, excitations, strict=True)):
@@ -302,15 +302,15 @@ def draw_case(random, truth, kind):
     return case
 
 
-def draw_experiment(random, mass, excitation, session, edges):
+def draw_experiment(random, mass, excitation, seconds, edges, rate):
     """Without specimen and effects, as yet."""
-    duration = random.uniform(*session.seconds)
+    duration = random.uniform(*seconds)
     if mass is None:
         low, high = random.uniform(0.8, 1.5), random.uniform(2.5, 4.5)
-        command = low + (high - low) * course(random, excitation, duration, edges, session.rates[0])
+        command = low + (high - low) * course(random, excitation, duration, edges, rate)
         return Experiment(Specimen(), command, motion=imposed_motion(random, duration))
     reach = random.uniform(0.6, 1.0)
-    command = hanging_command(course(random, excitation, duration, edges, session.rates[0]), mass, reach)
+    command = hanging_command(course(random, excitation, duration, edges, rate), mass, reach)
     return Experiment(Specimen(), command, mass)
 
 
