@@ -58,6 +58,17 @@ impl Signal {
     }
 }
 
+/// How a command goes between its samples, which no column tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Between {
+    /// Along straight lines, as where a logger runs by itself: what comes closest to any smooth course.
+    Lines,
+    /// Along straight lines, but it jumps at the very sample that shows a jump, as where one program sets and logs it.
+    Jumps,
+    /// It is held until the next sample, as by a digital controller that logs what it sets.
+    Held,
+}
+
 /// What was measured in one experiment.
 #[derive(Debug, Clone)]
 pub struct Recording {
@@ -77,8 +88,8 @@ pub struct Recording {
     units: BTreeMap<Signal, &'static str>,
     /// How many samples of the file there were to each of these, see [`Self::thinned`].
     every: usize,
-    /// Whether the command jumps at the samples that show it, see [`Self::with_late_jumps`].
-    late_jumps: bool,
+    /// How the command goes between its samples.
+    between: Between,
     /// What a person should know about how the file was read.
     pub notes: Vec<String>,
 }
@@ -152,7 +163,7 @@ impl Recording {
             units,
             notes,
             every: 1,
-            late_jumps: false,
+            between: Between::Lines,
         }
         .checked()
     }
@@ -161,7 +172,7 @@ impl Recording {
     pub(crate) fn planned(name: &str, time: Vec<f64>, inputs: BTreeMap<Signal, Vec<f64>>) -> Self {
         let (path, name) = (PathBuf::from(name), name.to_owned());
         let (lines, units, notes) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Self { path, name, number: None, time, lines, signals: inputs, units, notes, every: 1, late_jumps: false }
+        Self { path, name, number: None, time, lines, signals: inputs, units, notes, every: 1, between: Between::Lines }
     }
 
     /// Refuses what no use could be made of, and drops rows without a new time.
@@ -261,31 +272,41 @@ impl Recording {
 
     /// The recording with about one sample per `period` in s, as far as there are as many and at least a thousand remain.
     /// Samples are left out; the command is a weighted mean, its weight falling to zero at the next sample that stays, so that
-    /// a step between two of them keeps its time. Where the command jumps at a sample, that one stays, and no mean reaches over the jump.
+    /// a step between two of them keeps its time; of a command that is held, the mean until then. Where it jumps far at a sample, that one
+    /// stays, and no mean reaches over the jump.
     pub fn thinned(&self, period: f64) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let every = ((period / self.period()).round() as usize).min(self.time.len() / THINNED_SAMPLES).max(1);
-        let jumps = self.late_jumps();
-        let kept = || (0..self.time.len()).filter(|k| k % every == 0 || jumps.contains(k));
-        let picked = |values: &[f64]| kept().map(|k| values[k]).collect();
-        let mean = |values: &[f64], centre: usize| {
-            let near = centre.saturating_sub(every - 1)..(centre + every).min(values.len());
-            if jumps.range(near.clone()).next().is_some() {
-                return values[centre];
+        let command = self.bridged(Command).filter(|_| self.between != Between::Lines);
+        let jumps = command.map(|command| self.far_jumps(&command)).unwrap_or_default();
+        let kept: Vec<usize> = (0..self.time.len()).filter(|k| k % every == 0 || jumps.contains(k)).collect();
+        let picked = |values: &[f64]| kept.iter().map(|k| values[*k]).collect();
+        let weights = |position: usize| -> Vec<(usize, f64)> {
+            let centre = kept[position];
+            if self.between == Between::Held {
+                let next = kept.get(position + 1).copied().unwrap_or(self.time.len());
+                return (centre..next).map(|k| (k, 1.0)).collect();
             }
-            let present = near.filter(|k| !values[*k].is_nan());
-            let weighted = present.map(|k| ((every - k.abs_diff(centre)) as f64, values[k]));
+            let near = centre.saturating_sub(every - 1)..(centre + every).min(self.time.len());
+            match jumps.range(near.clone()).next() {
+                Some(_) => vec![(centre, 1.0)],
+                None => near.map(|k| (k, (every - k.abs_diff(centre)) as f64)).collect(),
+            }
+        };
+        let mean = |values: &[f64], position: usize| {
+            let present = weights(position).into_iter().filter(|(k, _)| !values[*k].is_nan());
             let (weights, sum) =
-                weighted.fold((0.0, 0.0), |(w, sum), (weight, value)| (w + weight, sum + weight * value));
+                present.fold((0.0, 0.0), |(w, sum), (k, weight)| (w + weight, sum + weight * values[k]));
             sum / weights
         };
         let thinned = |(signal, values): (&Signal, &Vec<f64>)| {
             let is_command = *signal == Command;
-            (*signal, if is_command { kept().map(|k| mean(values, k)).collect() } else { picked(values) })
+            let means = || (0..kept.len()).map(|position| mean(values, position)).collect();
+            (*signal, if is_command { means() } else { picked(values) })
         };
         Self {
             time: picked(&self.time),
-            lines: kept().map(|k| self.line(k)).collect(),
+            lines: kept.iter().map(|k| self.line(*k)).collect(),
             signals: self.signals.iter().map(thinned).collect(),
             every: self.every * every,
             ..self.clone()
@@ -295,59 +316,81 @@ impl Recording {
     /// The recording with an instant more in the middle between any two samples, where each signal is on the cubic through the
     /// two samples before and after, its gaps bridged.
     pub fn doubled(&self) -> Self {
-        let jumps = self.late_jumps();
+        let changes = self.own_changes();
         self.with_middles(|signal, values, k| match signal {
-            Command if jumps.contains(&(k + 1)) => values[k],
-            Command if [k, k + 2].iter().any(|end| jumps.contains(end)) => 0.5 * (values[k] + values[k + 1]),
+            Command if changes.contains(&(k + 1)) => values[k],
+            Command if [k, k + 2].iter().any(|end| changes.contains(end)) => 0.5 * (values[k] + values[k + 1]),
             _ => self.halfway(values, k),
         })
     }
 
     /// The same along straight lines, but for jumps of the command: these are over in the middle between their samples, or else
-    /// begin there; where samples were left out, they are that much less off. Jumps at samples are not in doubt.
+    /// begin there; where samples were left out, they are that much less off. What changes at samples is not in doubt.
     pub fn with_jumps(&self, early: bool) -> Self {
         let jumps = self.bridged(Command).map(|command| self.jumps(&command)).unwrap_or_default();
+        let changes = self.own_changes();
         self.with_middles(|signal, values, k| {
             let line = 0.5 * (values[k] + values[k + 1]);
-            match signal == Command && jumps.contains(&(k + 1)) {
-                true if self.late_jumps => values[k],
-                true => line + (values[if early { k + 1 } else { k }] - line) / self.every as f64,
-                false => line,
+            match signal {
+                Command if changes.contains(&(k + 1)) => values[k],
+                Command if jumps.contains(&(k + 1)) => {
+                    line + (values[if early { k + 1 } else { k }] - line) / self.every as f64
+                }
+                _ => line,
             }
         })
     }
 
-    /// The recording of a command that jumps at the very sample that shows the jump, as where one program sets and logs it, and not somewhere
-    /// between that sample and the one before.
-    pub fn with_late_jumps(&self) -> Self {
-        Self { late_jumps: true, ..self.clone() }
+    /// The recording of a command that went so between its samples; until this is said, along straight lines.
+    pub fn going(&self, between: Between) -> Self {
+        Self { between, ..self.clone() }
     }
 
-    /// Whether it is such a recording.
-    pub fn jumps_late(&self) -> bool {
-        self.late_jumps
+    /// How its command goes between its samples.
+    pub fn between(&self) -> Between {
+        self.between
     }
 
-    /// The bridged command as it comes to each sample: on straight lines from the sample before, but for jumps at the sample itself.
+    /// The bridged command as it comes to each sample: on straight lines from the sample before, but for what changes at the sample itself.
     pub fn arriving(&self, command: &[f64]) -> Vec<f64> {
         let mut arriving = command.to_vec();
-        if self.late_jumps {
-            self.jumps(command).into_iter().for_each(|k| arriving[k] = command[k - 1]);
-        }
+        self.changing(command).into_iter().for_each(|k| arriving[k] = command[k - 1]);
         arriving
     }
 
-    /// Samples at which the command jumps, where it does that at samples.
-    fn late_jumps(&self) -> BTreeSet<usize> {
-        let command = if self.late_jumps { self.bridged(Command) } else { None };
-        command.map(|command| self.jumps(&command)).unwrap_or_default()
+    /// Samples at which the bridged command changes, and not before.
+    fn changing(&self, command: &[f64]) -> BTreeSet<usize> {
+        match self.between {
+            Between::Lines => BTreeSet::new(),
+            Between::Jumps => self.jumps(command),
+            Between::Held => (1..command.len()).collect(),
+        }
     }
 
-    /// Whether the command jumps by more than a hundredth of its span.
-    pub fn jumps_far(&self) -> bool {
-        let Some(command) = self.bridged(Command) else { return false };
+    /// The same of its own command.
+    fn own_changes(&self) -> BTreeSet<usize> {
+        self.bridged(Command).map(|command| self.changing(&command)).unwrap_or_default()
+    }
+
+    /// Samples at which the bridged command jumps by more than a hundredth of its span.
+    fn far_jumps(&self, command: &[f64]) -> BTreeSet<usize> {
         let [least, most] = [f64::min, f64::max].map(|of| command.iter().copied().fold(command[0], of));
-        self.jumps(&command).into_iter().any(|k| (command[k] - command[k - 1]).abs() > FAR * (most - least))
+        let is_far = |k: &usize| (command[*k] - command[k - 1]).abs() > FAR * (most - least);
+        self.jumps(command).into_iter().filter(is_far).collect()
+    }
+
+    /// Whether it makes a difference that the command goes so and in no simpler way: it jumps by more than a hundredth of its span, or changes
+    /// without jumps.
+    pub fn can_go(&self, between: Between) -> bool {
+        let Some(command) = self.bridged(Command) else { return false };
+        match between {
+            Between::Lines => true,
+            Between::Jumps => !self.far_jumps(&command).is_empty(),
+            Between::Held => {
+                let jumps = self.jumps(&command);
+                (1..command.len()).any(|k| command[k] != command[k - 1] && !jumps.contains(&k))
+            }
+        }
     }
 
     /// Samples that show a jump of the bridged command: after more than twice as fast a change as goes before and comes after.
@@ -614,13 +657,13 @@ mod tests {
         let text = rows("time [s],command [V],contraction [mm]", |k| {
             format!("{k},{},{k}", if k < 5 { 1.0 } else { 3.0 + 0.1 * k as f64 })
         });
-        let late = parse(&text).unwrap().with_late_jumps();
+        let late = parse(&text).unwrap().going(Between::Jumps);
         let (command, arriving) = (late.bridged(Command).unwrap(), late.arriving(late.get(Command).unwrap()));
         let differ: Vec<usize> = (0..12).filter(|&k| command[k] != arriving[k]).collect();
         assert_eq!((differ, arriving[5]), (vec![5], 1.0));
         for between in [late.doubled(), late.with_jumps(true), late.with_jumps(false)] {
             assert_eq!(between.get(Command).unwrap()[9], 1.0);
-            assert_eq!(between.late_jumps().into_iter().collect::<Vec<_>>(), [10]);
+            assert_eq!(between.own_changes().into_iter().collect::<Vec<_>>(), [10]);
         }
     }
 
@@ -628,12 +671,46 @@ mod tests {
     fn thinning_keeps_the_sample_of_a_late_jump() {
         let time: Vec<f64> = (0..4000).map(|k| 1e-3 * f64::from(k)).collect();
         let command = time.iter().map(|t| if *t < 1.9985 { 1.0 } else { 3.0 }).collect();
-        let recording = Recording::planned("r", time, BTreeMap::from([(Command, command)])).with_late_jumps();
+        let recording = Recording::planned("r", time, BTreeMap::from([(Command, command)])).going(Between::Jumps);
         let thinned = recording.thinned(4e-3);
-        let jumps = thinned.late_jumps();
+        let jumps = thinned.own_changes();
         assert_eq!(jumps.iter().map(|k| thinned.time[*k]).collect::<Vec<_>>(), [1.999]);
         assert!(thinned.get(Command).unwrap().iter().all(|command| [1.0, 3.0].contains(command)));
         assert_eq!(thinned.time.len(), 1001);
+    }
+
+    #[test]
+    fn thinning_keeps_the_area_under_a_held_command() {
+        let time: Vec<f64> = (0..4000).map(|k| 1e-3 * f64::from(k)).collect();
+        let command = time.iter().map(|t| if *t < 1.9985 { *t } else { 5.0 }).collect();
+        let held = Recording::planned("r", time, BTreeMap::from([(Command, command)])).going(Between::Held);
+        let area = |recording: &Recording| {
+            let spans = recording.time.windows(2).map(|pair| pair[1] - pair[0]);
+            recording.arriving(recording.get(Command).unwrap())[1..]
+                .iter()
+                .zip(spans)
+                .map(|(u, span)| u * span)
+                .sum::<f64>()
+        };
+        let thinned = held.thinned(4e-3);
+        let (last, end) = (*thinned.time.last().unwrap(), *held.time.last().unwrap());
+        assert_eq!(thinned.time.len(), 1001);
+        assert!((area(&thinned) - area(&held) + 5.0 * (end - last)).abs() < 1e-9);
+        assert!(thinned.time.contains(&1.999), "a far jump keeps its instant");
+    }
+
+    #[test]
+    fn it_is_known_in_which_ways_a_command_may_have_gone() {
+        let ways = |command: &dyn Fn(f64) -> f64| {
+            let time: Vec<f64> = (0..40).map(f64::from).collect();
+            let command = time.iter().map(|t| command(*t)).collect();
+            let recording = Recording::planned("r", time, BTreeMap::from([(Command, command)]));
+            [Between::Lines, Between::Jumps, Between::Held].map(|between| recording.can_go(between))
+        };
+        assert_eq!(ways(&|_| 1.0), [true, false, false]);
+        assert_eq!(ways(&|t| if t < 20.0 { 1.0 } else { 2.0 }), [true, true, false]);
+        assert_eq!(ways(&|t| t), [true, false, true]);
+        assert_eq!(ways(&|t| if t < 20.0 { 0.0 } else { t }), [true, true, true]);
     }
 
     #[test]

@@ -75,7 +75,8 @@ const AT_REST: (f64, f64) = (2.0, 1.0);
 /// Share of its span within which a command is held.
 const HELD: f64 = 1e-3;
 
-/// Simulates an experiment with its recorded inputs, which are joined by straight lines, but for jumps [at samples](Recording::with_late_jumps).
+/// Simulates an experiment with its recorded inputs, which are joined by straight lines, unless the command is said to
+/// go [otherwise](Recording::going).
 ///
 /// With a hanging load the input is the command; without, it is the contraction with the command or, where there is
 /// none, with the measured pressure. Measured inputs are what the sensors showed: the effects on the sensors are undone.
@@ -529,6 +530,7 @@ pub fn closed_loop_on(plant: &Parameters, known: &Parameters, step: f64, duratio
 mod tests {
     use super::*;
     use crate::effects::Description;
+    use crate::measurement::Between;
     use crate::variables::Declared;
 
     const PERIOD: f64 = 0.01;
@@ -568,27 +570,31 @@ mod tests {
     }
 
     #[test]
-    fn a_valve_answers_a_late_jump_from_its_sample_on() {
-        // Of first order: p = p∞ + (p₀ − p∞) exp(−ω (t − t₀)).
-        const JUMP: usize = 20;
-        let command = |k: usize| if k < JUMP { 2.0 } else { 3.0 };
-        let mut text = "time [s],command [V],contraction [mm],load_mass [kg]\n".to_owned();
-        for k in 0..60 {
-            text += &format!("{:.2},{},100,20\n", PERIOD * k as f64, command(k));
-        }
-        let recording = Recording::parse(text.as_bytes(), std::path::Path::new("jump.csv"), &[]).unwrap();
+    fn a_valve_answers_a_command_that_changes_at_samples_from_there_on() {
+        // Of first order, while the command is u: p(t) = G u + (p(0) − G u) exp(−ω t).
         let parameters = Parameters::default();
         let pressure = |recording: &Recording| {
             replay(&parameters, recording).unwrap().get(Signal::GaugePressure).unwrap().to_vec()
         };
-        let late = pressure(&recording.with_late_jumps());
-        for (k, pressure) in late.iter().enumerate() {
-            let after = PERIOD * k.saturating_sub(JUMP) as f64;
-            let expected = 3e5 - 1e5 * (-parameters.valve.bandwidth * after).exp();
-            assert!((pressure - expected).abs() < 1.0, "{k}: {pressure} {expected}");
+        let jump = |k: u32| if k < 20 { 2.0 } else { 3.0 };
+        let ramp = |k: u32| 2.0 + 0.05 * f64::from(k);
+        let cases: [(&dyn Fn(u32) -> f64, Between); 2] = [(&jump, Between::Jumps), (&ramp, Between::Held)];
+        for (command, between) in cases {
+            let mut text = "time [s],command [V],contraction [mm],load_mass [kg]\n".to_owned();
+            for k in 0..60 {
+                text += &format!("{:.2},{},100,20\n", PERIOD * f64::from(k), command(k));
+            }
+            let recording = Recording::parse(text.as_bytes(), std::path::Path::new("changes.csv"), &[]).unwrap();
+            let shown = pressure(&recording.going(between));
+            let mut expected = parameters.valve.gain * command(0);
+            for (k, shown) in (0..).zip(&shown) {
+                assert!((shown - expected).abs() < 1.0, "{between:?}, {k}: {shown} {expected}");
+                let wanted = parameters.valve.gain * command(k);
+                expected = wanted + (expected - wanted) * (-parameters.valve.bandwidth * PERIOD).exp();
+            }
+            // Along a straight line from the sample before it begins earlier.
+            assert!(pressure(&recording)[20] > shown[20] + 100.0, "{between:?}");
         }
-        // Along a straight line from the sample before it begins earlier.
-        assert!(pressure(&recording)[JUMP] > late[JUMP] + 5e3);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use sinew::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, Verdict, diagnose};
 use sinew::measurement::Signal::{Command, Contraction, Force, GaugePressure};
-use sinew::measurement::{Recording, numbered};
+use sinew::measurement::{Between, Recording, numbered};
 use sinew::parameters::Parameters;
 use sinew::simulation::{replay, slopes};
 use std::path::Path;
@@ -57,8 +57,8 @@ fn stairs_and_ramps(time: f64) -> f64 {
 }
 
 #[test]
-fn a_command_that_jumps_at_its_samples_is_no_cause() {
-    // A program that sets the command and logs it: with straight lines between samples each step would come 10 ms too early.
+fn a_command_that_changes_at_its_samples_is_no_cause() {
+    // A program that sets the command and logs it, or holds it: with straight lines between samples it would come 10 ms too early.
     let text = |shown: &dyn Fn(usize) -> String| {
         let row =
             |k: usize| format!("{:.2},{:.5},{},40\n", 0.02 * k as f64, stairs_and_ramps(0.02 * k as f64), shown(k));
@@ -66,16 +66,18 @@ fn a_command_that_jumps_at_its_samples_is_no_cause() {
         (0..1300).fold(header, |text, k| text + &row(k))
     };
     let parsed = |text: String| Recording::parse(text.as_bytes(), Path::new("jumps.csv"), &[]).unwrap();
-    let inputs = parsed(text(&|_| "1,100".to_owned())).with_late_jumps();
-    let truth = replay(&Parameters::default(), &inputs).unwrap();
-    let [pressure, contraction] = [GaugePressure, Contraction].map(|signal| truth.get(signal).unwrap());
     let noise = |k: usize, by: f64| ((k * k) as f64 * by).sin() + ((k * k) as f64 * 1.7 * by).cos();
-    let shown = |k: usize| {
-        let bar = 1e-5 * pressure[k] + 0.003 * noise(k, 0.71);
-        format!("{bar:.4},{:.3}", 1e3 * contraction[k] + 0.05 * noise(k, 0.37))
-    };
-    let found = diagnosis_of(&[parsed(text(&shown))]);
-    assert_eq!((found.verdict, causes(&found), found.jumps_at_samples), (Verdict::Nominal, vec![], true));
+    for between in [Between::Jumps, Between::Held] {
+        let inputs = parsed(text(&|_| "1,100".to_owned())).going(between);
+        let truth = replay(&Parameters::default(), &inputs).unwrap();
+        let [pressure, contraction] = [GaugePressure, Contraction].map(|signal| truth.get(signal).unwrap());
+        let shown = |k: usize| {
+            let bar = 1e-5 * pressure[k] + 0.003 * noise(k, 0.71);
+            format!("{bar:.4},{:.3}", 1e3 * contraction[k] + 0.05 * noise(k, 0.37))
+        };
+        let found = diagnosis_of(&[parsed(text(&shown))]);
+        assert_eq!((found.verdict, causes(&found), found.between), (Verdict::Nominal, vec![], between));
+    }
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub use remaining::Remaining;
 pub use residuals::HeldOut;
 
 use crate::Result;
-use crate::measurement::{Recording, Signal};
+use crate::measurement::{Between, Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality;
 use crate::variables::Declared;
@@ -41,9 +41,20 @@ use unlisted::Shown;
 /// How far a nominal muscle's own coefficients may be off without being called wrong, by default.
 pub const DEFAULT_TOLERANCE: f64 = 0.03;
 
-/// What a person should know where the command jumps at samples.
-const JUMPS_AT_SAMPLES: &str = "the command jumps at the samples that first show it: simulated so, the same causes explain far more than \
-                                with straight lines from the samples before; hold it until then when another tool replays the recording";
+/// What a person should know of a command that does not go along straight lines between its samples.
+fn says_how_command_goes(between: Between) -> Option<&'static str> {
+    match between {
+        Between::Lines => None,
+        Between::Jumps => Some(
+            "the command jumps at the samples that first show it: simulated so, the same causes explain far more than \
+             with straight lines from the samples before; hold it until then when another tool replays the recording",
+        ),
+        Between::Held => Some(
+            "the command is held from each sample to the next: simulated so, the same causes explain far more than \
+             with straight lines between samples; hold it when another tool replays the recording",
+        ),
+    }
+}
 
 /// What the recordings say of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -132,8 +143,8 @@ pub struct Diagnosis {
     pub ranking: Vec<Ranked>,
     /// The extended model: the nominal one with corrections within the tolerance and the named cause.
     pub extended: Parameters,
-    /// Whether the command jumps at the samples that show it, and not on the way there: that explains the data better.
-    pub jumps_at_samples: bool,
+    /// How the command goes between its samples: what explains the data best.
+    pub between: Between,
     /// Corrections of the nominal model that were fitted along.
     pub corrections: Vec<FittedParameter>,
     /// Where the cause is unknown: a smooth correction without one, which explains nothing. No part of `extended`.
@@ -145,10 +156,9 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Recordings as they are simulated: with jumps of the command where they were found to be.
+    /// Recordings as they are simulated: with the command between samples as it was found to go.
     pub fn taken(&self, recordings: &[Recording]) -> Vec<Recording> {
-        let taken = |r: &Recording| if self.jumps_at_samples { r.with_late_jumps() } else { r.clone() };
-        recordings.iter().map(taken).collect()
+        recordings.iter().map(|recording| recording.going(self.between)).collect()
     }
 }
 
@@ -168,9 +178,8 @@ pub fn diagnose(
 ) -> Result<Diagnosis> {
     let notes = quality::notes(recordings, nominal)?;
     let cannot_follow = || residuals::cannot_follow(recordings);
-    let late: Vec<Recording> = recordings.iter().map(Recording::with_late_jumps).collect();
-    let [on_the_way, at_samples] = [recordings, &late].map(|taken| Taken::new(taken, nominal, tolerance));
-    let (found, data) = timing::better(&on_the_way, &at_samples, fitting)?;
+    let taken = Taken::in_all_ways(recordings, nominal, tolerance);
+    let (found, data) = timing::better(&taken, fitting)?;
     answer(found.bench(), data, nominal, &found.chosen, notes).ok_or_else(cannot_follow)
 }
 
@@ -188,10 +197,8 @@ fn answer(
                 .to_owned(),
         );
     }
-    let jumps_at_samples = data.recordings().iter().any(Recording::jumps_late);
-    if jumps_at_samples {
-        notes.push(JUMPS_AT_SAMPLES.to_owned());
-    }
+    let between = data.recordings()[0].between();
+    notes.extend(says_how_command_goes(between).map(str::to_owned));
     let nominal_residuals = data.residuals(nominal)?;
     let mut left = data.residuals(&chosen.model.parameters)?;
     data.refine_noise(&left);
@@ -230,7 +237,7 @@ fn answer(
         saw_all: chosen.saw_all,
         ranking: chosen.singles.iter().map(baseline).collect(),
         extended,
-        jumps_at_samples,
+        between,
         corrections,
         notes,
         remaining: unlisted(bench, chosen).into_iter().chain(remaining::remaining(&data, &extended, &left)).collect(),

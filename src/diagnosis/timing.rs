@@ -1,18 +1,19 @@
-//! When the command jumped between two samples: somewhere on the way, as where a logger runs by itself, or at the very sample that shows it,
-//! as where one program sets and logs the command. No column tells which; half a sampling interval makes errors that flows, delays and dead
-//! bands can stand for, so that what explains the data better with the same causes decides.
+//! How the command went between two samples: somewhere on the way, as where a logger runs by itself; or it jumped at the very sample that
+//! shows it, as where one program sets and logs it; or it was held from sample to sample, as by a digital controller. No column tells which;
+//! half a sampling interval makes errors that flows, delays and dead bands can stand for, so that what explains the data better with the
+//! same causes decides.
 
 use super::Fitting;
 use super::fits::{Bench, Changes, Fitted};
 use super::hypothesis::{Hypothesis, Off};
-use super::residuals::{self, Data, Scope};
-use super::selection::evidence::{gain, odds};
-use super::selection::{LEAST_EVIDENCE, MOST_EFFECTS};
+use super::residuals::{self, Data, Loss, Scope};
+use super::selection::evidence::{explained, gain, odds};
+use super::selection::{LEAST_EVIDENCE, MAY_COME_FURTHER, MOST_EFFECTS};
 use super::ways::{Begun, Found, Way};
 use crate::Result;
 use crate::effects::Effects;
 use crate::integrator::Accuracy;
-use crate::measurement::Recording;
+use crate::measurement::{Between, Recording};
 use crate::parameters::Parameters;
 
 /// Seconds between samples that fits use, about: two hundred a second resolve the fastest effect, and more only take longer.
@@ -34,27 +35,37 @@ pub fn thinned(recordings: &[Recording]) -> Vec<Recording> {
     recordings.iter().map(|recording| recording.thinned(period.clamp(PERIODS.0, PERIODS.1))).collect()
 }
 
-/// Recordings, taken in one way, with what is asked of them.
+/// Recordings whose command went between samples in one way, with what is asked of them.
 pub struct Taken<'r> {
     nominal: &'r Parameters,
     tolerance: f64,
-    recordings: &'r [Recording],
+    recordings: Vec<Recording>,
     /// With as many samples as fits need.
     thinned: Vec<Recording>,
     changes: Changes,
 }
 
 impl<'r> Taken<'r> {
-    /// Recordings against a nominal model that is good to `tolerance`.
-    pub fn new(recordings: &'r [Recording], nominal: &'r Parameters, tolerance: f64) -> Self {
+    /// Recordings against a nominal model that is good to `tolerance`, in all ways that make a difference; straight lines come first.
+    pub fn in_all_ways(recordings: &[Recording], nominal: &'r Parameters, tolerance: f64) -> Vec<Self> {
+        let differs = |between: &Between| {
+            *between == Between::Lines || is_off_in_two_ways(nominal) && recordings.iter().any(|r| r.can_go(*between))
+        };
+        let ways = [Between::Lines, Between::Jumps, Between::Held].into_iter().filter(differs);
+        ways.map(|between| Self::new(recordings, between, nominal, tolerance)).collect()
+    }
+
+    fn new(recordings: &[Recording], between: Between, nominal: &'r Parameters, tolerance: f64) -> Self {
         // A single way asks for each once.
         let changes = Changes::new(if is_off_in_two_ways(nominal) { usize::MAX } else { 0 });
-        Self { nominal, tolerance, recordings, thinned: thinned(recordings), changes }
+        let recordings: Vec<Recording> = recordings.iter().map(|recording| recording.going(between)).collect();
+        let thinned = thinned(&recordings);
+        Self { nominal, tolerance, recordings, thinned, changes }
     }
 
     /// All samples.
     fn data(&self) -> Result<Data<'_>> {
-        Data::new(self.recordings, self.nominal, self.tolerance)
+        Data::new(&self.recordings, self.nominal, self.tolerance)
     }
 
     fn bench(&self, off: Off) -> Result<Bench<'_>> {
@@ -66,7 +77,7 @@ impl<'r> Taken<'r> {
 
     fn way(&self, off: Off) -> Result<Way<'_>> {
         let way = Way::new(self.bench(off)?, off == Off::most(self.nominal));
-        way.ok_or_else(|| residuals::cannot_follow(self.recordings))
+        way.ok_or_else(|| residuals::cannot_follow(&self.recordings))
     }
 
     fn first_way(&self) -> Result<Way<'_>> {
@@ -83,7 +94,7 @@ impl<'r> Taken<'r> {
 
     fn ended<'a>(&'a self, begun: Begun<'a>, fitting: &'a Fitting<'a>) -> Result<Found<'a>> {
         let found = begun.better(|| self.wide_way(), fitting)?;
-        found.ok_or_else(|| residuals::cannot_follow(self.recordings))
+        found.ok_or_else(|| residuals::cannot_follow(&self.recordings))
     }
 
     /// What there is to find.
@@ -92,7 +103,7 @@ impl<'r> Taken<'r> {
         if is_off_in_two_ways(self.nominal) {
             return self.ended(self.begun(first, fitting)?, fitting);
         }
-        first.searched(MOST_EFFECTS, fitting).ok_or_else(|| residuals::cannot_follow(self.recordings))
+        first.searched(MOST_EFFECTS, fitting).ok_or_else(|| residuals::cannot_follow(&self.recordings))
     }
 }
 
@@ -101,80 +112,98 @@ fn is_off_in_two_ways(nominal: &Parameters) -> bool {
     Off::ways(nominal).len() > 1
 }
 
-/// What is found in recordings with jumps on the way, or at samples where that explains them better; with all samples of these.
+/// What is found in recordings where the command went along straight lines, the first ones, or as explains them far better; with all samples
+/// of these.
 ///
 /// # Errors
 /// Those of the simulation of the nominal model.
-pub fn better<'a>(
-    on_the_way: &'a Taken<'a>,
-    at_samples: &'a Taken<'a>,
-    fitting: &'a Fitting<'a>,
-) -> Result<(Found<'a>, Data<'a>)> {
-    let data = on_the_way.data()?; // a model that cannot be simulated at all is the user's to mend
-    if !is_off_in_two_ways(on_the_way.nominal) || !on_the_way.recordings.iter().any(Recording::jumps_far) {
-        return Ok((on_the_way.searched(fitting)?, data));
+pub fn better<'a>(taken: &'a [Taken<'a>], fitting: &'a Fitting<'a>) -> Result<(Found<'a>, Data<'a>)> {
+    let lines = &taken[0];
+    let mut data = vec![lines.data()?]; // a model that cannot be simulated at all is the user's to mend
+    if taken.len() == 1 {
+        return Ok((lines.searched(fitting)?, data.remove(0)));
     }
-    let way = on_the_way.first_way()?;
-    let (others, anew) = (at_samples.data()?, at_samples.bench(way.bench().off)?);
-    if !needs_jumps_at_samples(&way, &anew, &data, &others) {
-        let begun = on_the_way.begun(way, fitting)?;
-        if !is_mistimed(&begun, &anew, &data, &others) {
-            return in_turn((on_the_way.ended(begun, fitting)?, data), at_samples, others, fitting);
+    let way = lines.first_way()?;
+    let mut benches = Vec::new();
+    for other in &taken[1..] {
+        data.push(other.data()?);
+        benches.push(other.bench(way.bench().off)?);
+    }
+    let (mut best, found) = match needed_at_once(&way, &benches, &data) {
+        Some(best) => (best, taken[best].searched(fitting)?),
+        None => {
+            let begun = lines.begun(way, fitting)?;
+            match needed_by_singles(&begun, &benches, &data) {
+                Some(best) => (best, taken[best].searched(fitting)?),
+                None => (0, lines.ended(begun, fitting)?),
+            }
         }
-    }
-    in_turn((at_samples.searched(fitting)?, others), on_the_way, data, fitting)
-}
-
-/// Whether one of the best single effects explains the data far better with jumps at samples; `anew` fits it there.
-fn is_mistimed(begun: &Begun, anew: &Bench, data: &Data, others: &Data) -> bool {
-    let is_better = |single: &Fitted| explains_better((data, single), (others, &anew.rough_fit_again(single)?));
-    begun.singles().take(TRIED).any(|single| is_better(single) == Some(true))
-}
-
-/// What was found, or what is found where jumps come as in `other`, if the same causes explain the data better there.
-fn in_turn<'a>(
-    (found, data): (Found<'a>, Data<'a>),
-    other: &'a Taken<'a>,
-    others: Data<'a>,
-    fitting: &'a Fitting<'a>,
-) -> Result<(Found<'a>, Data<'a>)> {
-    if found.leaves_nothing_by_one() {
-        return Ok((found, data));
-    }
-    let best = &found.chosen.best;
-    let fitted = other.bench(found.bench().off)?.exact_fit(&best.hypothesis, &best.parameters, Scope::All);
-    if fitted.and_then(|fitted| explains_better((&data, best), (&others, &fitted))) == Some(true) {
-        return Ok((other.searched(fitting)?, others));
-    }
-    Ok((found, data))
-}
-
-/// Whether jumps at samples explain what the nominal model leaves far better than jumps on the way, and no worse than a dead time would;
-/// `anew` fits it there.
-fn needs_jumps_at_samples(way: &Way, anew: &Bench, data: &Data, others: &Data) -> bool {
-    let is_needed = || {
-        let (bench, baseline) = (way.bench(), way.baseline());
-        let [own, jumping] = losses(data, [(data, baseline), (others, &anew.rough_fit_again(baseline)?)])?;
-        if gain(&own, &jumping) <= LEAST_EVIDENCE {
-            return Some(false);
-        }
-        let dead_time = Effects::description("valve_dead_time")?;
-        let start = bench.starts(baseline, dead_time).into_iter().next()?;
-        let late = Hypothesis::default().with(start.part);
-        let [late] = losses(data, [(data, &bench.exact_fit(&late, &start.parameters, Scope::All)?)])?;
-        Some(odds(&late, &jumping, -1.0) >= 0.0)
     };
-    is_needed() == Some(true)
+    let found = match needed_in_the_end(&found, best, taken, &data) {
+        Some(other) => {
+            best = other;
+            taken[best].searched(fitting)?
+        }
+        None => found,
+    };
+    Ok((found, data.swap_remove(best)))
 }
 
-/// Whether the second of two fits of the same causes to recordings that were taken in different ways is far better.
-fn explains_better(one: (&Data, &Fitted), other: (&Data, &Fitted)) -> Option<bool> {
-    let [without, with] = losses(one.0, [one, other])?;
-    Some(gain(&without, &with) > LEAST_EVIDENCE)
+/// Which other way explains what the nominal model leaves far better, and no worse than a dead time would.
+fn needed_at_once(way: &Way, benches: &[Bench], data: &[Data]) -> Option<usize> {
+    let (bench, baseline) = (way.bench(), way.baseline());
+    let own = losses(&data[0], &data[0], baseline)?;
+    let (best, going) = far_better(&[own], again(baseline, benches, data))?;
+    let dead_time = Effects::description("valve_dead_time")?;
+    let start = bench.starts(baseline, dead_time).into_iter().next()?;
+    let late = Hypothesis::default().with(start.part);
+    let late = losses(&data[0], &data[0], &bench.exact_fit(&late, &start.parameters, Scope::All)?)?;
+    (odds(&late, &going, -1.0) >= 0.0).then_some(best)
 }
 
-/// Losses of fits to recordings that were taken in one way or another, as the noise of the first one has them.
-fn losses<const N: usize>(judge: &Data, fits: [(&Data, &Fitted); N]) -> Option<[Vec<residuals::Loss>; N]> {
-    let each = fits.map(|(data, fitted)| Some(judge.losses(&data.residuals(&fitted.parameters)?, Scope::All)));
-    each.into_iter().collect::<Option<Vec<_>>>()?.try_into().ok()
+/// Which other way explains the data far better with one of the best single effects than these do.
+fn needed_by_singles(begun: &Begun, benches: &[Bench], data: &[Data]) -> Option<usize> {
+    let singles: Vec<&Fitted> = begun.singles().take(TRIED).collect();
+    let own = singles.iter().map(|single| losses(&data[0], &data[0], single)).collect::<Option<Vec<_>>>()?;
+    let others = singles.into_iter().flat_map(|single| again(single, benches, data));
+    far_better(&own, others).map(|(best, _)| best)
+}
+
+/// Which other way explains the data far better with the causes that were found in the one that was thought best, and a good part of what they
+/// leave there; none is needed where at most one cause leaves nothing.
+fn needed_in_the_end(found: &Found, best: usize, taken: &[Taken], data: &[Data]) -> Option<usize> {
+    if found.leaves_nothing_by_one() {
+        return None;
+    }
+    let fitted = &found.chosen.best;
+    let own = losses(&data[best], &data[best], fitted)?;
+    let others = (0..taken.len()).filter(|other| *other != best).filter_map(|other| {
+        let bench = taken[other].bench(found.bench().off).ok()?;
+        let again = bench.exact_fit(&fitted.hypothesis, &fitted.parameters, Scope::All)?;
+        Some((other, losses(&data[best], &data[other], &again)?))
+    });
+    let is_worth_it = |other: &[Loss]| explained(&own, other, &data[best]) >= MAY_COME_FURTHER;
+    far_better(std::slice::from_ref(&own), others.filter(|(_, other)| is_worth_it(other))).map(|(best, _)| best)
+}
+
+/// Losses of fits of the same causes to the recordings as they were taken in the other ways.
+fn again<'f>(
+    fitted: &'f Fitted,
+    benches: &'f [Bench],
+    data: &'f [Data],
+) -> impl Iterator<Item = (usize, Vec<Loss>)> + 'f {
+    let each = (1..).zip(benches);
+    each.filter_map(|(way, bench)| Some((way, losses(&data[0], &data[way], &bench.rough_fit_again(fitted)?)?)))
+}
+
+/// The best of fits in other ways that explain the data far better than all own ones.
+fn far_better(own: &[Vec<Loss>], others: impl Iterator<Item = (usize, Vec<Loss>)>) -> Option<(usize, Vec<Loss>)> {
+    let is_far_better = |other: &[Loss]| own.iter().all(|own| gain(own, other) > LEAST_EVIDENCE);
+    let better = others.filter(|(_, other)| is_far_better(other));
+    better.reduce(|best, next| if gain(&best.1, &next.1) > 0.0 { next } else { best })
+}
+
+/// Losses of a fit to recordings that were taken in one way, as the noise of another one has them.
+fn losses(judge: &Data, data: &Data, fitted: &Fitted) -> Option<Vec<Loss>> {
+    Some(judge.losses(&data.residuals(&fitted.parameters)?, Scope::All))
 }

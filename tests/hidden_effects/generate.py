@@ -177,9 +177,9 @@ EXCITATIONS = {"staircase": staircase, "ramps": ramps, "multisine": multisine, "
 
 # How the command turns: its corners rounded over 0.1 s by a filter; sharp, at any time, as where a logger runs by
 # itself; sharp, steps at samples, as where one program sets and logs the command; held from sample to sample, ramps
-# too, as by a digital controller that logs (only on request).
+# too, as by a digital controller that logs what it sets.
 EDGES = ("rounded", "sharp", "at_samples", "held")
-EDGES_SHARES = (0.6, 0.2, 0.2, 0.0)
+EDGES_SHARES = (0.4, 0.2, 0.2, 0.2)
 
 
 def course(random, excitation, duration, edges="rounded", rate=None):

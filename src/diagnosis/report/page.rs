@@ -249,6 +249,7 @@ fn next_measurements(diagnosis: &Diagnosis, recordings: &[Recording]) -> Vec<Str
 mod tests {
     use super::*;
     use crate::diagnosis::{HeldOut, Remaining};
+    use crate::measurement::Between;
     use crate::simulation::replay;
 
     #[test]
@@ -273,7 +274,7 @@ mod tests {
             saw_all: false,
             ranking: vec![Ranked { effect: "creep", explained: -0.001, evidence: -3.2, parameters: Vec::new() }],
             extended: Parameters::default(),
-            jumps_at_samples: false,
+            between: Between::Lines,
             corrections: vec![correction],
             notes: vec!["<b>bold</b>".to_owned()],
             remaining: vec![Remaining {

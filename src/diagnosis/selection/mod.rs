@@ -25,7 +25,7 @@ const LEAST_OF_FORM: f64 = 0.9;
 /// The same before the hypothesis is refined: fits of two effects that came to be named began at 0.87 and more.
 const MAY_GO_FURTHER: f64 = 0.5;
 /// The same before what the effects so far do is looked at anew.
-const MAY_COME_FURTHER: f64 = 0.2;
+pub const MAY_COME_FURTHER: f64 = 0.2;
 /// Variance, relative to that of the noise, that an effect must take off where what is left without it may be the form of another one, or
 /// coefficients that are off: what is less than the noise itself says nothing of a cause.
 pub const LEAST_BESIDE_OTHERS: f64 = 1.0;
