@@ -12,8 +12,8 @@ from support import ROOT, run, write_parameters
 
 HIDDEN_EFFECTS = ROOT / "tests" / "hidden_effects"
 
-# One case of every effect of the library, and some of everything else; two to three minutes.
-BATCH = "any-known:26,none:8,any-unknown:8,pairs:6"
+# Sixteen effects of the library, drawn, and some of everything else; five to ten minutes.
+BATCH = "any-known:16,none:6,any-unknown:6,pairs:6"
 
 
 def test_fresh_hidden_effects_are_named_as_often_as_claimed(sinew, tmp_path, note):
