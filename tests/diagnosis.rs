@@ -68,7 +68,7 @@ fn a_command_that_changes_at_its_samples_is_no_cause() {
     let parsed = |text: String| Recording::parse(text.as_bytes(), Path::new("jumps.csv"), &[]).unwrap();
     let noise = |k: usize, by: f64| ((k * k) as f64 * by).sin() + ((k * k) as f64 * 1.7 * by).cos();
     for between in [Between::Jumps, Between::Held] {
-        let inputs = parsed(text(&|_| "1,100".to_owned())).going(between);
+        let inputs = parsed(text(&|_| "1.6,100".to_owned())).going(between);
         let truth = replay(&Parameters::default(), &inputs).unwrap();
         let [pressure, contraction] = [GaugePressure, Contraction].map(|signal| truth.get(signal).unwrap());
         let shown = |k: usize| {
