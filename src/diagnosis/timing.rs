@@ -123,30 +123,27 @@ pub fn better<'a>(taken: &'a [Taken<'a>], fitting: &'a Fitting<'a>) -> Result<(F
     if taken.len() == 1 {
         return Ok((lines.searched(fitting)?, data.remove(0)));
     }
-    let way = lines.first_way()?;
+    let first = lines.first_way()?;
     let mut benches = Vec::new();
     for other in &taken[1..] {
         data.push(other.data()?);
-        benches.push(other.bench(way.bench().off)?);
+        benches.push(other.bench(first.bench().off)?);
     }
-    let (mut best, found) = match needed_at_once(&way, &benches, &data) {
-        Some(best) => (best, taken[best].searched(fitting)?),
-        None => {
-            let begun = lines.begun(way, fitting)?;
-            match needed_by_singles(&begun, &benches, &data) {
-                Some(best) => (best, taken[best].searched(fitting)?),
-                None => (0, lines.ended(begun, fitting)?),
-            }
+    let anew = |way: usize| -> Result<_> { Ok((way, taken[way].searched(fitting)?)) };
+    let (way, found) = if let Some(way) = needed_at_once(&first, &benches, &data) {
+        anew(way)?
+    } else {
+        let begun = lines.begun(first, fitting)?;
+        match needed_by_singles(&begun, &benches, &data) {
+            Some(way) => anew(way)?,
+            None => (0, lines.ended(begun, fitting)?),
         }
     };
-    let found = match needed_in_the_end(&found, best, taken, &data) {
-        Some(other) => {
-            best = other;
-            taken[best].searched(fitting)?
-        }
-        None => found,
+    let (way, found) = match needed_in_the_end(&found, way, taken, &data) {
+        Some(other) => anew(other)?,
+        None => (way, found),
     };
-    Ok((found, data.swap_remove(best)))
+    Ok((found, data.swap_remove(way)))
 }
 
 /// Which other way explains what the nominal model leaves far better, and no worse than a dead time would.
