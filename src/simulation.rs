@@ -63,16 +63,15 @@ impl Replay {
     }
 }
 
-/// Longest time in s over which the pressure at the start is judged where it rests.
+/// Samples whose mean is taken as the pressure at the start where it moves; and longest time in s over which it is judged where it
+/// rests.
+const START_SAMPLES: usize = 5;
 const START_SPAN: f64 = 1.0;
 /// Fewest samples that tell whether it rests.
 const TO_TELL: usize = 20;
-/// Samples that are the first ones of these; and by how many standard deviations of the second half their mean, and that of the first
-/// quarter, may differ from their level: a straight line makes five, a step before the start more.
-const FIRST: usize = 5;
+/// By how many standard deviations of the second half of these the first samples' mean, and that of the first quarter, may differ from
+/// their level: a straight line makes five, a step before the start more.
 const AT_REST: (f64, f64) = (2.0, 1.0);
-/// By how many the first sample may differ from the mean of the first ones.
-const LEAPS: f64 = 3.0;
 /// Share of its span within which a command is held.
 const HELD: f64 = 1e-3;
 
@@ -206,7 +205,7 @@ fn initial_pressure(parameters: &Parameters, recording: &Recording, command: &[f
             let truth: Vec<f64> = first.map(|k| effects.true_pressure(readings[k], time[k] - time[0])).collect();
             // Behind a shut valve it may still drift.
             let since = mean(&time[..truth.len()]) - time[0];
-            let drift = if truth.len() > FIRST { slope(&time[..truth.len()], &truth) } else { 0.0 };
+            let drift = if truth.len() > START_SAMPLES { slope(&time[..truth.len()], &truth) } else { 0.0 };
             (mean(&truth) - drift * since).max(0.0)
         }
         None => {
@@ -222,7 +221,7 @@ pub(crate) fn start_deviation(recording: &Recording, noise: f64, inflation: f64)
     let (command, readings) = (recording.bridged(Signal::Command)?, recording.bridged(Signal::GaugePressure)?);
     let first = resting(&recording.time, &command, &readings);
     // The end of a straight line through readings is four times as uncertain as their mean.
-    let of_line = if first > FIRST { 4.0 } else { 1.0 };
+    let of_line = if first > START_SAMPLES { 4.0 } else { 1.0 };
     let of_noise = noise * (of_line * inflation / first as f64).sqrt().min(1.0);
     // What rests shows the same steps all the time.
     let step = recording.get(Signal::GaugePressure).and_then(resolution).unwrap_or(0.0);
@@ -230,25 +229,21 @@ pub(crate) fn start_deviation(recording: &Recording, noise: f64, inflation: f64)
 }
 
 /// How many of the first readings show the pressure at the start: as many as there are before the command moves, unless they move
-/// by themselves by more than a slow drift, or are too few to tell: then a few; the first alone where it differs from these.
+/// by themselves by more than a slow drift.
 fn resting(time: &[f64], command: &[f64], readings: &[f64]) -> usize {
+    let few = START_SAMPLES.min(readings.len());
     let [least, most] = [f64::min, f64::max].map(|of| command.iter().copied().fold(command[0], of));
     let is_held =
         |k: &usize| (command[*k] - command[0]).abs() <= HELD * (most - least) && time[*k] - time[0] <= START_SPAN;
     let held = &readings[..(0..readings.len()).take_while(is_held).count()];
     if held.len() < TO_TELL {
-        return FIRST.min(readings.len());
+        return few;
     }
     let (_, late) = held.split_at(held.len() / 2);
     let level = mean(late);
     let deviation = (late.iter().map(|reading| (reading - level).powi(2)).sum::<f64>() / late.len() as f64).sqrt();
     let is_off = |first: usize, most: f64| (mean(&held[..first]) - level).abs() > most * deviation;
-    let leaps = (held[0] - mean(&held[..FIRST])).abs() > LEAPS * deviation;
-    match is_off(FIRST, AT_REST.0) || is_off(held.len() / 4, AT_REST.1) {
-        true if leaps => 1,
-        true => FIRST,
-        false => held.len(),
-    }
+    if is_off(few, AT_REST.0) || is_off(held.len() / 4, AT_REST.1) { few } else { held.len() }
 }
 
 /// A prescribed motion behind the readings of the position sensor.
@@ -561,10 +556,10 @@ mod tests {
     fn the_pressure_at_the_start_is_the_mean_of_all_readings_at_rest() {
         assert_eq!(rests(60, |_| 2e5), 61);
         assert_eq!(rests(250, |_| 2e5), 101, "a second at most");
-        assert_eq!(rests(0, |_| 2e5), FIRST, "the command moves at once");
-        assert_eq!(rests(60, |time| 2e5 + 2e4 * (-time / 0.064).exp()), 1, "the pressure still moves");
-        assert_eq!(rests(120, |time| 2e5 + 2e5 * (-time / 0.025).exp()), 1, "the pressure still moves");
-        assert_eq!(rests(25, |time| 2e5 + 1e5 * time), FIRST, "the pressure drifts");
+        assert_eq!(rests(0, |_| 2e5), START_SAMPLES, "the command moves at once");
+        assert_eq!(rests(60, |time| 2e5 + 2e4 * (-time / 0.064).exp()), START_SAMPLES, "the pressure still moves");
+        assert_eq!(rests(120, |time| 2e5 + 2e5 * (-time / 0.025).exp()), START_SAMPLES, "the pressure still moves");
+        assert_eq!(rests(25, |time| 2e5 + 1e5 * time), START_SAMPLES, "the pressure still moves");
     }
 
     fn followed(parameters: &Parameters) -> Replay {
