@@ -10,6 +10,7 @@ use crate::plant::{
     ActuatorInputs, ActuatorOutputs, MeasuredInputs, MuscleAlone, MuscleInputs, MuscleOutputs, PneumaticActuator,
     PneumaticMuscle, masses, resting_pressure, steady_pressure,
 };
+use crate::quality::quantile;
 use crate::quality::sensors::resolution;
 use crate::recent::Recent;
 use crate::reference::ReferenceTrajectory;
@@ -63,9 +64,12 @@ impl Replay {
     }
 }
 
-/// Samples whose mean is taken as the pressure at the start where it moves; and longest time in s over which it is judged where it
-/// rests.
+/// Samples whose mean is taken as the pressure at the start where it drifts; by how many standard deviations of noise it may move
+/// within them; and how many samples tell this noise.
 const START_SAMPLES: usize = 5;
+const MOVED: f64 = 3.0;
+const NOISE_SAMPLES: usize = 100;
+/// Longest time in s over which the pressure at the start is judged where it rests.
 const START_SPAN: f64 = 1.0;
 /// Fewest samples that tell whether it rests.
 const TO_TELL: usize = 20;
@@ -229,9 +233,9 @@ pub(crate) fn start_deviation(recording: &Recording, noise: f64, inflation: f64)
 }
 
 /// How many of the first readings show the pressure at the start: as many as there are before the command moves, unless they move
-/// by themselves by more than a slow drift.
+/// by themselves by more than a slow drift: then a few, or the first alone where it moves fast.
 fn resting(time: &[f64], command: &[f64], readings: &[f64]) -> usize {
-    let few = START_SAMPLES.min(readings.len());
+    let few = if moves_at_once(readings) { 1 } else { START_SAMPLES.min(readings.len()) };
     let [least, most] = [f64::min, f64::max].map(|of| command.iter().copied().fold(command[0], of));
     let is_held =
         |k: &usize| (command[*k] - command[0]).abs() <= HELD * (most - least) && time[*k] - time[0] <= START_SPAN;
@@ -243,7 +247,21 @@ fn resting(time: &[f64], command: &[f64], readings: &[f64]) -> usize {
     let level = mean(late);
     let deviation = (late.iter().map(|reading| (reading - level).powi(2)).sum::<f64>() / late.len() as f64).sqrt();
     let is_off = |first: usize, most: f64| (mean(&held[..first]) - level).abs() > most * deviation;
-    if is_off(few, AT_REST.0) || is_off(held.len() / 4, AT_REST.1) { few } else { held.len() }
+    if is_off(START_SAMPLES, AT_REST.0) || is_off(held.len() / 4, AT_REST.1) { few } else { held.len() }
+}
+
+/// Whether the first few readings go on in one direction by more than noise, which second differences tell, or rounding would make
+/// them: neither a glitch nor a step does.
+fn moves_at_once(readings: &[f64]) -> bool {
+    let [first, second, others @ ..] = &readings[..START_SAMPLES.min(readings.len())] else { return false };
+    let early = &readings[..NOISE_SAMPLES.min(readings.len())];
+    let differences: Vec<f64> = early.windows(3).map(|of| (of[0] - 2.0 * of[1] + of[2]).abs()).collect();
+    // Standard deviation of these for white noise, and their median beside it (of a normal distribution).
+    let noise = quantile(&differences, 0.5).unwrap_or(0.0) / (6.0_f64.sqrt() * 0.6745);
+    let deviation = noise.max(resolution(early).unwrap_or(0.0) / 12.0_f64.sqrt());
+    let steps = [second - first, mean(others) - second];
+    let moved = steps[0] + steps[1];
+    moved.abs() > MOVED * deviation && steps.iter().all(|step| step * moved.signum() > deviation)
 }
 
 /// A prescribed motion behind the readings of the position sensor.
@@ -557,9 +575,10 @@ mod tests {
         assert_eq!(rests(60, |_| 2e5), 61);
         assert_eq!(rests(250, |_| 2e5), 101, "a second at most");
         assert_eq!(rests(0, |_| 2e5), START_SAMPLES, "the command moves at once");
-        assert_eq!(rests(60, |time| 2e5 + 2e4 * (-time / 0.064).exp()), START_SAMPLES, "the pressure still moves");
-        assert_eq!(rests(120, |time| 2e5 + 2e5 * (-time / 0.025).exp()), START_SAMPLES, "the pressure still moves");
-        assert_eq!(rests(25, |time| 2e5 + 1e5 * time), START_SAMPLES, "the pressure still moves");
+        assert_eq!(rests(0, |time| 2e5 + 1e5 * (6.0 * time).sin()), 1, "the pressure moves at once");
+        assert_eq!(rests(60, |time| 2e5 + 2e4 * (-time / 0.064).exp()), 1, "the pressure still moves");
+        assert_eq!(rests(120, |time| 2e5 + 2e5 * (-time / 0.025).exp()), 1, "the pressure still moves");
+        assert_eq!(rests(25, |time| 2e5 + 2e4 * time), START_SAMPLES, "the pressure drifts");
     }
 
     fn followed(parameters: &Parameters) -> Replay {

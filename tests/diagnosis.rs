@@ -56,8 +56,8 @@ fn stairs_and_ramps(time: f64) -> f64 {
     if time < 13.0 { level(step) } else { level(step) + (level(step + 1.0) - level(step)) * (2.0 * after).min(1.0) }
 }
 
-/// A sound muscle at 50 samples a second with noise whose command goes so between its samples.
-fn sound_muscle(between: Between) -> Recording {
+/// A sound muscle at 50 samples a second with noise, from a gauge pressure in bar on, whose command goes so between its samples.
+fn sound_muscle(between: Between, start: f64) -> Recording {
     let text = |shown: &dyn Fn(usize) -> String| {
         let row =
             |k: usize| format!("{:.2},{:.5},{},40\n", 0.02 * k as f64, stairs_and_ramps(0.02 * k as f64), shown(k));
@@ -65,7 +65,7 @@ fn sound_muscle(between: Between) -> Recording {
         (0..1300).fold(header, |text, k| text + &row(k))
     };
     let parsed = |text: String| Recording::parse(text.as_bytes(), Path::new("sound.csv"), &[]).unwrap();
-    let inputs = parsed(text(&|_| "1.6,100".to_owned())).going(between);
+    let inputs = parsed(text(&|_| format!("{start},100"))).going(between);
     let truth = replay(&Parameters::default(), &inputs).unwrap();
     let [pressure, contraction] = [GaugePressure, Contraction].map(|signal| truth.get(signal).unwrap());
     let noise = |k: usize, by: f64| ((k * k) as f64 * by).sin() + ((k * k) as f64 * 1.7 * by).cos();
@@ -79,8 +79,17 @@ fn sound_muscle(between: Between) -> Recording {
 fn a_command_that_changes_at_its_samples_is_no_cause() {
     // A program that sets the command and logs it, or holds it: with straight lines between samples it would come 10 ms too early.
     for between in [Between::Jumps, Between::Held] {
-        let found = diagnosis_of(&[sound_muscle(between)]);
+        let found = diagnosis_of(&[sound_muscle(between, stairs_and_ramps(0.0))]);
         assert_eq!((found.verdict, causes(&found), found.between), (Verdict::Nominal, vec![], between));
+    }
+}
+
+#[test]
+fn a_recording_that_begins_while_the_pressure_still_rises_is_no_cause() {
+    let found = diagnosis_of(&[sound_muscle(Between::Lines, 1.0)]);
+    assert_eq!((found.verdict, causes(&found), found.between), (Verdict::Nominal, vec![], Between::Lines));
+    for signal in &found.signals {
+        assert!(signal.extended_rms < 1.5 * signal.noise_rms, "{signal:?}");
     }
 }
 

@@ -63,7 +63,7 @@ fn present(values: &[f64]) -> Vec<f64> {
 }
 
 /// Value below which a share of the present values lies; `None` where there are none.
-fn quantile(values: &[f64], share: f64) -> Option<f64> {
+pub(crate) fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted = present(values);
     sorted.sort_by(f64::total_cmp);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
