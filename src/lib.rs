@@ -58,6 +58,8 @@ pub mod simulation;
 #[cfg(feature = "tool")]
 pub mod ssp;
 #[cfg(feature = "tool")]
+mod start;
+#[cfg(feature = "tool")]
 pub mod tuning;
 
 pub use error::{Error, Result};

@@ -21,3 +21,13 @@ crate::variables::variables! {
         gauge_pressure: f64 = 0.0, PASCAL, (0.0..=2e6);
     }
 }
+
+crate::variables::variables! {
+    /// How the load moves where a simulation starts.
+    pub struct InitialMotion in "initial_motion." as Fixed {
+        /// Contraction at the start beyond the one at which the load hangs still
+        contraction_offset: f64 = 0.0, METRE, (-1.0..=1.0);
+        /// Rate of the contraction at the start
+        contraction_velocity: f64 = 0.0, METRE_PER_SECOND, (-10.0..=10.0);
+    }
+}

@@ -1,5 +1,6 @@
 //! Recordings: columns of a CSV file in SI units.
 
+use crate::start::Motion;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -90,6 +91,8 @@ pub struct Recording {
     every: usize,
     /// How the command goes between its samples.
     between: Between,
+    /// How the load moves at the start; `None` where it may rest.
+    motion: Option<Motion>,
     /// What a person should know about how the file was read.
     pub notes: Vec<String>,
 }
@@ -164,6 +167,7 @@ impl Recording {
             notes,
             every: 1,
             between: Between::Lines,
+            motion: None,
         }
         .checked()
     }
@@ -172,7 +176,8 @@ impl Recording {
     pub(crate) fn planned(name: &str, time: Vec<f64>, inputs: BTreeMap<Signal, Vec<f64>>) -> Self {
         let (path, name) = (PathBuf::from(name), name.to_owned());
         let (lines, units, notes) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Self { path, name, number: None, time, lines, signals: inputs, units, notes, every: 1, between: Between::Lines }
+        let (between, motion) = (Between::Lines, None);
+        Self { path, name, number: None, time, lines, signals: inputs, units, notes, every: 1, between, motion }
     }
 
     /// Refuses what no use could be made of, and drops rows without a new time.
@@ -212,6 +217,13 @@ impl Recording {
             None
         };
         complaint.map_or(Ok(()), |text| Err(problem(text)))?;
+        let contraction = self.bridged(Contraction).filter(|_| self.load_mass().is_some());
+        self.motion = contraction.and_then(|contraction| Motion::shown_by(&self.time, &contraction));
+        if let Some(Motion { contraction, velocity, .. }) = self.motion {
+            let [place, rate] = [contraction, velocity].map(|of| 1e3 * of);
+            self.notes
+                .push(format!("the load moves at the start: simulations begin at {place:.1} mm with {rate:.0} mm/s"));
+        }
         Ok(self)
     }
 
@@ -409,6 +421,21 @@ impl Recording {
         let mut shifted = self.clone();
         shifted.signals.get_mut(&signal).into_iter().flatten().for_each(|value| *value += by);
         shifted
+    }
+
+    /// How its load moves at the start; `None` where it may rest, or that is not known.
+    pub(crate) fn motion(&self) -> Option<Motion> {
+        self.motion
+    }
+
+    /// The recording of a load that moves at the start by as many deviations more, of its contraction and of the rate of it.
+    pub(crate) fn moving_by(&self, [place, rate]: [f64; 2]) -> Self {
+        let more = |motion: Motion| Motion {
+            contraction: motion.contraction + place * motion.deviations[0],
+            velocity: motion.velocity + rate * motion.deviations[1],
+            ..motion
+        };
+        Self { motion: self.motion.map(more), ..self.clone() }
     }
 
     /// The recording with an instant more in the middle between any two samples; what a signal is there is told by its values, their

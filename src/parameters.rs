@@ -3,7 +3,7 @@
 use crate::controller::{Controller, FeedForward, Sampling};
 use crate::correction::UnknownCause;
 use crate::effects::Effects;
-use crate::load::{Initial, Load};
+use crate::load::{Initial, InitialMotion, Load};
 use crate::muscle::{ForceModelName, ForceModels, Muscle};
 use crate::reference::Reference;
 use crate::valve::Valve;
@@ -39,6 +39,8 @@ groups! {
     load: Load,
     /// Where a simulation starts.
     initial: Initial,
+    /// How the load moves there.
+    initial_motion: InitialMotion,
     /// PID controller.
     controller: Controller,
     /// When the controller acts.

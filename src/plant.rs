@@ -395,6 +395,18 @@ fn equilibrium_with(parameters: &Parameters, gauge_pressure: f64, weight: impl F
     Some(bisect(surplus, at(bracket), at(bracket + 1)))
 }
 
+/// Contraction in m at which the load hangs still at the start, pulled down by a force in N beyond its weight.
+///
+/// # Errors
+/// [`Error::NoEquilibrium`].
+pub fn hanging_contraction(parameters: &Parameters, external_force: f64) -> Result<f64> {
+    let gauge_pressure = parameters.initial.gauge_pressure;
+    let mass = |contraction| masses(parameters, contraction).0;
+    let hanging =
+        equilibrium_with(parameters, gauge_pressure, |contraction| mass(contraction) * GRAVITY + external_force);
+    hanging.ok_or_else(|| Error::NoEquilibrium { mass: mass(0.0), external_force, gauge_pressure })
+}
+
 /// Muscle, valve and a load that hangs from it.
 ///
 /// # Model
@@ -414,7 +426,7 @@ impl System for PneumaticMuscle {
             "valve   d(gauge_pressure)/dt = bandwidth (gain max(command, 0) - gauge_pressure)\n\
              muscle  force = F(gauge_pressure, contraction) - damping contraction_velocity\n\
              load    mass d(contraction_velocity)/dt = force - mass 9.81 m/s2 - external_force\n\n\
-             At the start the load hangs still at initial.gauge_pressure.\n\n\
+             At the start the load hangs still at initial.gauge_pressure, unless initial_motion has it move.\n\n\
              F of muscle.force_model, with contraction x, its rate v, length L = rest_length - x, thread_length b and \
              turns n:\n",
             force_equations!(),
@@ -422,7 +434,7 @@ impl System for PneumaticMuscle {
         limits: LIMITS,
         source: SOURCE,
     };
-    const GROUPS: &'static [&'static str] = &["muscle", "valve", "load", "initial", "unknown_cause"];
+    const GROUPS: &'static [&'static str] = &["muscle", "valve", "load", "initial", "initial_motion", "unknown_cause"];
     const EFFECTS: bool = true;
     const FEEDTHROUGH: &'static [Feedthrough] = &[];
     const INITIAL_INPUTS: &'static [&'static str] = &["load.external_force"];
@@ -435,16 +447,11 @@ impl System for PneumaticMuscle {
     const SCALE: Self::State = Extended(Effects::scales(&[1e5, 0.1, 0.1]));
 
     fn initial_state(parameters: &Parameters, inputs: &MuscleInputs) -> Result<Self::State> {
-        let gauge_pressure = parameters.initial.gauge_pressure;
-        let mass = |contraction| masses(parameters, contraction).0;
-        let weight = |contraction| mass(contraction) * GRAVITY + inputs.external_force;
-        let hanging = equilibrium_with(parameters, gauge_pressure, weight);
-        let contraction = hanging.ok_or_else(|| Error::NoEquilibrium {
-            mass: mass(0.0),
-            external_force: inputs.external_force,
-            gauge_pressure,
-        })?;
-        Ok(hanging_state(parameters, &at_start(parameters, gauge_pressure, contraction)))
+        let motion = parameters.initial_motion;
+        let contraction = hanging_contraction(parameters, inputs.external_force)? + motion.contraction_offset;
+        let mut at = at_start(parameters, parameters.initial.gauge_pressure, contraction);
+        at.contraction_velocity += motion.contraction_velocity;
+        Ok(hanging_state(parameters, &at))
     }
 
     #[inline]

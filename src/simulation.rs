@@ -8,12 +8,11 @@ use crate::model::{Simulator, System};
 use crate::parameters::Parameters;
 use crate::plant::{
     ActuatorInputs, ActuatorOutputs, MeasuredInputs, MuscleAlone, MuscleInputs, MuscleOutputs, PneumaticActuator,
-    PneumaticMuscle, masses, resting_pressure, steady_pressure,
+    PneumaticMuscle, masses, resting_pressure,
 };
-use crate::quality::quantile;
-use crate::quality::sensors::resolution;
 use crate::recent::Recent;
 use crate::reference::ReferenceTrajectory;
+use crate::start::{initial_motion, initial_pressure};
 use crate::variables::Signals;
 use crate::{Error, GRAVITY, Result};
 
@@ -64,28 +63,13 @@ impl Replay {
     }
 }
 
-/// Samples whose mean is taken as the pressure at the start where it drifts; by how many standard deviations of noise it may move
-/// within them; and how many samples tell this noise.
-const START_SAMPLES: usize = 5;
-const MOVED: f64 = 3.0;
-const NOISE_SAMPLES: usize = 100;
-/// Longest time in s over which the pressure at the start is judged where it rests.
-const START_SPAN: f64 = 1.0;
-/// Fewest samples that tell whether it rests.
-const TO_TELL: usize = 20;
-/// By how many standard deviations of the second half of these the first samples' mean, and that of the first quarter, may differ from
-/// their level: a straight line makes five, a step before the start more.
-const AT_REST: (f64, f64) = (2.0, 1.0);
-/// Share of its span within which a command is held.
-const HELD: f64 = 1e-3;
-
 /// Simulates an experiment with its recorded inputs, which are joined by straight lines, unless the command is said to
 /// go [otherwise](Recording::going).
 ///
 /// With a hanging load the input is the command; without, it is the contraction with the command or, where there is
 /// none, with the measured pressure. Measured inputs are what the sensors showed: the effects on the sensors are undone.
-/// The simulation starts at rest at the first measured pressure, by all readings before the command moves, or, where there is none,
-/// at the one that the first command leads to.
+/// The simulation starts at the first measured pressure, by all readings before the command moves, or, where there is none,
+/// at the one that the first command leads to; at rest, unless the readings of the contraction show that it moves.
 ///
 /// # Errors
 /// [`Error::Replay`], with what the simulation failed of.
@@ -135,6 +119,7 @@ fn replay_chain(
     let time = &recording.time;
     if let Some(mass) = recording.load_mass() {
         parameters.load.mass = mass;
+        parameters.initial_motion = initial_motion(&parameters, recording);
         let inputs = [&command, &arriving]
             .map(|command| move |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 });
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
@@ -198,70 +183,6 @@ fn replay_pull(parameters: &Parameters, recording: &Recording, accuracy: Accurac
         motion.pull(),
         &given,
     )
-}
-
-/// Gauge pressure in Pa at the start of a recording.
-fn initial_pressure(parameters: &Parameters, recording: &Recording, command: &[f64]) -> f64 {
-    match recording.bridged(Signal::GaugePressure) {
-        Some(readings) => {
-            let (time, effects) = (&recording.time, &parameters.effects);
-            let first = 0..resting(time, command, &readings);
-            let truth: Vec<f64> = first.map(|k| effects.true_pressure(readings[k], time[k] - time[0])).collect();
-            // Behind a shut valve it may still drift.
-            let since = mean(&time[..truth.len()]) - time[0];
-            let drift = if truth.len() > START_SAMPLES { slope(&time[..truth.len()], &truth) } else { 0.0 };
-            (mean(&truth) - drift * since).max(0.0)
-        }
-        None => {
-            let contraction = recording.bridged(Signal::Contraction).map_or(0.0, |readings| readings[0]);
-            steady_pressure(parameters, command[0], parameters.effects.true_contraction(contraction, 0.0, 0.0))
-        }
-    }
-}
-
-/// Standard deviation in Pa of the pressure that readings tell at the start of a recording, given the noise of one and how many of them are
-/// worth one that is independent; `None` where none tells it.
-pub(crate) fn start_deviation(recording: &Recording, noise: f64, inflation: f64) -> Option<f64> {
-    let (command, readings) = (recording.bridged(Signal::Command)?, recording.bridged(Signal::GaugePressure)?);
-    let first = resting(&recording.time, &command, &readings);
-    // The end of a straight line through readings is four times as uncertain as their mean.
-    let of_line = if first > START_SAMPLES { 4.0 } else { 1.0 };
-    let of_noise = noise * (of_line * inflation / first as f64).sqrt().min(1.0);
-    // What rests shows the same steps all the time.
-    let step = recording.get(Signal::GaugePressure).and_then(resolution).unwrap_or(0.0);
-    Some(of_noise.hypot(step / 12.0_f64.sqrt()))
-}
-
-/// How many of the first readings show the pressure at the start: as many as there are before the command moves, unless they move
-/// by themselves by more than a slow drift: then a few, or the first alone where it moves fast.
-fn resting(time: &[f64], command: &[f64], readings: &[f64]) -> usize {
-    let few = if moves_at_once(readings) { 1 } else { START_SAMPLES.min(readings.len()) };
-    let [least, most] = [f64::min, f64::max].map(|of| command.iter().copied().fold(command[0], of));
-    let is_held =
-        |k: &usize| (command[*k] - command[0]).abs() <= HELD * (most - least) && time[*k] - time[0] <= START_SPAN;
-    let held = &readings[..(0..readings.len()).take_while(is_held).count()];
-    if held.len() < TO_TELL {
-        return few;
-    }
-    let (_, late) = held.split_at(held.len() / 2);
-    let level = mean(late);
-    let deviation = (late.iter().map(|reading| (reading - level).powi(2)).sum::<f64>() / late.len() as f64).sqrt();
-    let is_off = |first: usize, most: f64| (mean(&held[..first]) - level).abs() > most * deviation;
-    if is_off(START_SAMPLES, AT_REST.0) || is_off(held.len() / 4, AT_REST.1) { few } else { held.len() }
-}
-
-/// Whether the first few readings go on in one direction by more than noise, which second differences tell, or rounding would make
-/// them: neither a glitch nor a step does.
-fn moves_at_once(readings: &[f64]) -> bool {
-    let [first, second, others @ ..] = &readings[..START_SAMPLES.min(readings.len())] else { return false };
-    let early = &readings[..NOISE_SAMPLES.min(readings.len())];
-    let differences: Vec<f64> = early.windows(3).map(|of| (of[0] - 2.0 * of[1] + of[2]).abs()).collect();
-    // Standard deviation of these for white noise, and their median beside it (of a normal distribution).
-    let noise = quantile(&differences, 0.5).unwrap_or(0.0) / (6.0_f64.sqrt() * 0.6745);
-    let deviation = noise.max(resolution(early).unwrap_or(0.0) / 12.0_f64.sqrt());
-    let steps = [second - first, mean(others) - second];
-    let moved = steps[0] + steps[1];
-    moved.abs() > MOVED * deviation && steps.iter().all(|step| step * moved.signum() > deviation)
 }
 
 /// A prescribed motion behind the readings of the position sensor.
@@ -418,7 +339,7 @@ fn balance<S: System>(
     force
 }
 
-fn mean(values: &[f64]) -> f64 {
+pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
@@ -446,7 +367,7 @@ pub fn slopes(time: &[f64], values: &[f64]) -> Vec<f64> {
 }
 
 /// Slope of the least-squares line; zero for a single sample.
-fn slope(time: &[f64], values: &[f64]) -> f64 {
+pub(crate) fn slope(time: &[f64], values: &[f64]) -> f64 {
     let mean_time = mean(time);
     let (mut covariance, mut variance) = (0.0, 0.0);
     for (time, value) in time.iter().zip(values) {
@@ -557,32 +478,9 @@ mod tests {
         (0..300).map(|k| PERIOD * f64::from(k)).collect()
     }
 
-    /// Held for some samples, then rising.
-    fn command(held: usize) -> Vec<f64> {
-        (0..300_usize).map(|k| 2.0 + 0.01 * k.max(held) as f64).collect()
-    }
-
-    fn rests(held: usize, pressure: impl Fn(f64) -> f64) -> usize {
-        let time = time();
-        // Noise of 300 Pa that a sensor of 400 Pa shows.
-        let noise = |k: usize| 400.0 * (0.75 * ((k * k) as f64 * 0.7).sin()).round();
-        let readings: Vec<f64> = time.iter().enumerate().map(|(k, time)| pressure(*time) + noise(k)).collect();
-        resting(&time, &command(held), &readings)
-    }
-
-    #[test]
-    fn the_pressure_at_the_start_is_the_mean_of_all_readings_at_rest() {
-        assert_eq!(rests(60, |_| 2e5), 61);
-        assert_eq!(rests(250, |_| 2e5), 101, "a second at most");
-        assert_eq!(rests(0, |_| 2e5), START_SAMPLES, "the command moves at once");
-        assert_eq!(rests(0, |time| 2e5 + 1e5 * (6.0 * time).sin()), 1, "the pressure moves at once");
-        assert_eq!(rests(60, |time| 2e5 + 2e4 * (-time / 0.064).exp()), 1, "the pressure still moves");
-        assert_eq!(rests(120, |time| 2e5 + 2e5 * (-time / 0.025).exp()), 1, "the pressure still moves");
-        assert_eq!(rests(25, |time| 2e5 + 2e4 * time), START_SAMPLES, "the pressure drifts");
-    }
-
     fn followed(parameters: &Parameters) -> Replay {
-        let command = command(60);
+        // Held for some samples, then rising.
+        let command: Vec<f64> = (0..300_usize).map(|k| 2.0 + 0.01 * k.max(60) as f64).collect();
         let inputs = |k: usize, _: f64| MuscleInputs { command: command[k], external_force: 0.0 };
         let shown = |out: &MuscleOutputs| [out.measured_gauge_pressure, out.measured_contraction, out.measured_force];
         follow::<PneumaticMuscle>(parameters, &time(), Accuracy::USUAL, [inputs, inputs], shown, None, &[]).unwrap()

@@ -58,21 +58,26 @@ fn stairs_and_ramps(time: f64) -> f64 {
 
 /// A sound muscle at 50 samples a second with noise, from a gauge pressure in bar on, whose command goes so between its samples.
 fn sound_muscle(between: Between, start: f64) -> Recording {
+    Recording::parse(sound_muscle_as_text(between, start).as_bytes(), Path::new("sound.csv"), &[]).unwrap()
+}
+
+/// The same as a CSV file.
+fn sound_muscle_as_text(between: Between, start: f64) -> String {
     let text = |shown: &dyn Fn(usize) -> String| {
         let row =
             |k: usize| format!("{:.2},{:.5},{},40\n", 0.02 * k as f64, stairs_and_ramps(0.02 * k as f64), shown(k));
         let header = "time [s],command [V],gauge_pressure [bar],contraction [mm],load_mass [kg]\n".to_owned();
         (0..1300).fold(header, |text, k| text + &row(k))
     };
-    let parsed = |text: String| Recording::parse(text.as_bytes(), Path::new("sound.csv"), &[]).unwrap();
-    let inputs = parsed(text(&|_| format!("{start},100"))).going(between);
+    let inputs = text(&|_| format!("{start},100"));
+    let inputs = Recording::parse(inputs.as_bytes(), Path::new("inputs.csv"), &[]).unwrap().going(between);
     let truth = replay(&Parameters::default(), &inputs).unwrap();
     let [pressure, contraction] = [GaugePressure, Contraction].map(|signal| truth.get(signal).unwrap());
     let noise = |k: usize, by: f64| ((k * k) as f64 * by).sin() + ((k * k) as f64 * 1.7 * by).cos();
-    parsed(text(&|k| {
+    text(&|k| {
         let bar = 1e-5 * pressure[k] + 0.003 * noise(k, 0.71);
         format!("{bar:.4},{:.3}", 1e3 * contraction[k] + 0.05 * noise(k, 0.37))
-    }))
+    })
 }
 
 #[test]
@@ -88,6 +93,21 @@ fn a_command_that_changes_at_its_samples_is_no_cause() {
 fn a_recording_that_begins_while_the_pressure_still_rises_is_no_cause() {
     let found = diagnosis_of(&[sound_muscle(Between::Lines, 1.0)]);
     assert_eq!((found.verdict, causes(&found), found.between), (Verdict::Nominal, vec![], Between::Lines));
+    for signal in &found.signals {
+        assert!(signal.extended_rms < 1.5 * signal.noise_rms, "{signal:?}");
+    }
+}
+
+#[test]
+fn a_recording_that_is_cut_out_of_a_longer_one_is_no_cause() {
+    // From where the load swings on; every fiftieth of a second a reading.
+    let whole = sound_muscle_as_text(Between::Lines, stairs_and_ramps(0.0));
+    let mut rows = whole.lines();
+    let header = rows.next().unwrap();
+    let cut: String = rows.skip(155).map(|row| format!("{row}\n")).collect();
+    let recording = Recording::parse(format!("{header}\n{cut}").as_bytes(), Path::new("cut.csv"), &[]).unwrap();
+    let found = diagnosis_of(&[recording]);
+    assert_eq!((found.verdict, causes(&found)), (Verdict::Nominal, vec![]));
     for signal in &found.signals {
         assert!(signal.extended_rms < 1.5 * signal.noise_rms, "{signal:?}");
     }

@@ -7,7 +7,8 @@ use crate::parameters::Parameters;
 use crate::quality::correlation;
 use crate::quality::sensors::resolution;
 use crate::recent::Recent;
-use crate::simulation::{OUTPUTS, Replay, in_recording, replay, replay_remembering, replay_within, start_deviation};
+use crate::simulation::{OUTPUTS, Replay, in_recording, replay, replay_remembering, replay_within};
+use crate::start::pressure_deviation;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -51,9 +52,9 @@ pub struct Data<'a> {
     noise: BTreeMap<Signal, Noise>,
     /// Per residual, the error in SI that a jump of the command leaves since its instant between two samples is not known.
     mistimed: Vec<f64>,
-    /// Per residual, the error in SI that the pressure at the start of its recording leaves since readings tell it no better: one
-    /// standard deviation; empty where it counts as known.
-    by_start: Vec<f64>,
+    /// Per residual, the error in SI that the start of its recording leaves since readings tell it no better, one standard deviation: by
+    /// the pressure, and by place and rate of a load that moves there. Each is white of those before it; none where all count as known.
+    by_start: Vec<Vec<f64>>,
     /// Relative error of the nominal coefficients below which nothing is called wrong.
     pub tolerance: f64,
     /// Accuracy of the integration.
@@ -258,44 +259,59 @@ impl<'a> Data<'a> {
     }
 
     fn whiten_all(&self, residuals: &mut [f64]) {
-        if !self.by_start.is_empty() {
-            (0..self.recordings.len()).for_each(|recording| self.whiten(recording, residuals));
+        for common in &self.by_start {
+            (0..self.recordings.len()).for_each(|recording| self.whiten(recording, common, residuals));
         }
     }
 
-    /// Takes the pressure at the start for known no better than its readings tell; a model says what that does. Behind a valve that is shut
-    /// it is never forgotten: there the readings are all that there is, and what they lose is a leak.
+    /// Takes the start for known no better than its readings tell; a model says what that does. Behind a valve that is shut
+    /// the pressure is never forgotten: there the readings are all that there is, and what they lose is a leak.
     pub fn doubt_starts(&mut self, parameters: &Parameters) {
-        let Some(noise) = self.noise.get(&Signal::GaugePressure) else { return };
-        let deviation = |recording: &Recording| {
-            let is_kept = parameters.valve.is_shut(recording.duration());
-            if is_kept { 0.0 } else { start_deviation(recording, noise.level, noise.inflation).unwrap_or(0.0) }
+        let pressure = self.noise.get(&Signal::GaugePressure).copied();
+        let deviation = |recording: &Recording| match pressure {
+            Some(noise) if !parameters.valve.is_shut(recording.duration()) => {
+                pressure_deviation(recording, noise.level, noise.inflation).unwrap_or(0.0)
+            }
+            _ => 0.0,
         };
-        let deviations: Vec<f64> = self.recordings.iter().map(deviation).collect();
+        let of_pressure =
+            |recording: &Recording, by: f64| recording.shifted(Signal::GaugePressure, by * deviation(recording));
+        self.doubt(parameters, pressure.is_some(), of_pressure);
+        let moves = self.recordings.iter().any(|recording| recording.motion().is_some());
+        self.doubt(parameters, moves, |recording, by| recording.moving_by([by, 0.0]));
+        self.doubt(parameters, moves, |recording, by| recording.moving_by([0.0, by]));
+    }
+
+    /// Takes something for known to one deviation only, by which recordings are changed, if it is in doubt at all.
+    fn doubt(&mut self, parameters: &Parameters, is_doubted: bool, changed: impl Fn(&Recording, f64) -> Recording) {
+        if !is_doubted {
+            return;
+        }
         let off = |by: f64| {
-            let shifted =
-                self.recordings.iter().zip(&deviations).map(|(r, of)| r.shifted(Signal::GaugePressure, by * of));
-            self.residuals_on(&shifted.collect::<Vec<_>>(), 1, parameters)
+            let recordings: Vec<Recording> = self.recordings.iter().map(|recording| changed(recording, by)).collect();
+            self.residuals_on(&recordings, 1, parameters)
         };
         if let (Some(less), Some(more)) = (off(-1.0), off(1.0)) {
-            self.by_start = more.iter().zip(&less).map(|(more, less)| 0.5 * (more - less)).collect();
+            let mut common = more.iter().zip(&less).map(|(more, less)| 0.5 * (more - less)).collect::<Vec<_>>();
+            self.whiten_all(&mut common);
+            self.by_start.push(common);
         }
     }
 
     /// With an error at the start that does c to the residuals e of a recording, both in units of the noise, their covariance is
     /// C = 1 + c cᵀ; C^−½ e is white again.
-    fn whiten(&self, recording: usize, residuals: &mut [f64]) {
+    fn whiten(&self, recording: usize, common: &[f64], residuals: &mut [f64]) {
         let of_recording = || self.segments.iter().filter(|segment| segment.recording == recording);
         let weighted = of_recording().flat_map(|segment| {
             let noise = self.noise[&segment.signal];
             let weight = 1.0 / (noise.level.powi(2) * noise.inflation);
-            let both = self.by_start[segment.range.clone()].iter().zip(&residuals[segment.range.clone()]);
+            let both = common[segment.range.clone()].iter().zip(&residuals[segment.range.clone()]);
             both.map(move |(common, residual)| (weight, *common, *residual))
         });
         let share = share_to_whiten(weighted);
         let all = of_recording().flat_map(|segment| segment.range.clone());
         for at in all {
-            residuals[at] -= share * self.by_start[at];
+            residuals[at] -= share * common[at];
         }
     }
 

@@ -72,7 +72,7 @@ pub(crate) fn quantile(values: &[f64], share: f64) -> Option<f64> {
 }
 
 /// Largest less smallest present value; 0 where there is none.
-fn span(values: &[f64]) -> f64 {
+pub(crate) fn span(values: &[f64]) -> f64 {
     let present = present(values);
     let largest = present.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let smallest = present.iter().copied().fold(f64::INFINITY, f64::min);

@@ -46,6 +46,22 @@ def test_agrees_with_the_independent_solution(export, note, name):
     assert force < 0.01
 
 
+def test_starts_in_motion(muscle):
+    """From the middle of the independent solution on, where the load swings: its state there says how it goes on."""
+    whole = read_csv(REFERENCE / "nominal_multisine_20kg.csv")
+    recording = {name: column[403:904] for name, column in whole.items()}
+    gauge_pressure, contraction = recording["gauge_pressure"][0], recording["contraction"][0]
+    hanging = brentq(lambda x: static_force(VIRTUAL_AREA_1000, gauge_pressure, x) - 20.0 * GRAVITY, -0.05, 0.3, xtol=1e-14)
+    velocity = recording["contraction_velocity"][0]
+    assert abs(velocity) > 0.01
+    motion = {"contraction_offset": contraction - hanging, "contraction_velocity": velocity}
+    start = start_of(recording) | {f"initial_motion.{name}": value for name, value in motion.items()}
+    with Instance(muscle, start) as instance:
+        simulated = follow(instance, recording["time"] - recording["time"][0], recording["command"], SIGNALS)
+    measured = np.column_stack([recording[signal.split(".")[1]] for signal in SIGNALS])
+    assert (np.abs(simulated - measured).max(axis=0) < [1e-6, 1.0, 1e-5, 0.01]).all()
+
+
 def pieces(size):
     return lambda duration: [duration / round(duration / size)] * round(duration / size)
 
