@@ -101,7 +101,7 @@ fn deviation_of(readings: &[f64]) -> f64 {
     let differences: Vec<f64> = early.windows(5).map(difference).collect();
     // Standard deviation of these for white noise of one, and their median beside it (of a normal distribution).
     let noise = quantile(&differences, 0.5).unwrap_or(0.0) / (70.0_f64.sqrt() * 0.6745);
-    noise.max(resolution(readings).unwrap_or(0.0) / 12.0_f64.sqrt())
+    noise.max(resolution(early).unwrap_or(0.0) / 12.0_f64.sqrt())
 }
 
 /// How a load moves at the start of a recording.

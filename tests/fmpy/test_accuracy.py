@@ -51,7 +51,8 @@ def test_starts_in_motion(muscle):
     whole = read_csv(REFERENCE / "nominal_multisine_20kg.csv")
     recording = {name: column[403:904] for name, column in whole.items()}
     gauge_pressure, contraction = recording["gauge_pressure"][0], recording["contraction"][0]
-    hanging = brentq(lambda x: static_force(VIRTUAL_AREA_1000, gauge_pressure, x) - 20.0 * GRAVITY, -0.05, 0.3, xtol=1e-14)
+    weight = 20.0 * GRAVITY
+    hanging = brentq(lambda x: static_force(VIRTUAL_AREA_1000, gauge_pressure, x) - weight, -0.05, 0.3, xtol=1e-14)
     velocity = recording["contraction_velocity"][0]
     assert abs(velocity) > 0.01
     motion = {"contraction_offset": contraction - hanging, "contraction_velocity": velocity}

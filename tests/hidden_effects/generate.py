@@ -34,10 +34,12 @@ NEAR_OR_FAR = {
     **dict.fromkeys(SINCE_HELD, "near"),
 }
 DRIVEN_SHARE = 0.25
+CUT = (3, 8)  # s before a recording that begins on the way
 MOST_DRAWS = 20
 CONTRACTION = (0.045, 0.165)  # m, of commands at rest; overshoot takes some more
 COMMAND_STEP = 0.00025  # V, of the logger
 ALLOWED = (0.015, 0.225)  # m, of everything that happens
+SHOWN_OF_PLAN = ("excitation", "edges", "columns", "rate", "jitter", "begins")
 CASES_PER_BLOCK = 60  # made by one process at a time; larger ones take memory, smaller ones time
 
 # What must be there for an effect to show at all.
@@ -89,6 +91,7 @@ class Kind:
     same_form: bool = False
     session: Session = USUAL
     edges: str | None = None  # one of EDGES for all cases; None: drawn
+    cut: bool = False  # recordings begin somewhere on the way, and not at rest
 
 
 @dataclass
@@ -102,6 +105,7 @@ class Plan:
     edges: str
     rate: float
     jitter: float
+    begins: float  # s after the experiment
 
 
 @dataclass
@@ -298,7 +302,9 @@ def draw_case(random, truth, kind):
     for number, (experiment, excitation) in enumerate(zip(bare, excitations, strict=True)):
         here = tuple((form, form.in_recording(size, number)) for form, size in hidden)
         full = replace(experiment, specimen=specimen, hidden=here, relaxed=relaxed)
-        case.plans.append(Plan(full, experiment.mass, columns, str(excitation), edges, float(rate), float(jitter)))
+        begins = float(random.uniform(*CUT)) if kind.cut else 0.0
+        plan = Plan(full, experiment.mass, columns, str(excitation), edges, float(rate), float(jitter), begins)
+        case.plans.append(plan)
     return case
 
 
@@ -321,7 +327,7 @@ def sample_times(random, plan, length):
     period = 1 / plan.rate
     times = np.arange(0, length - period, period)
     times[1:] += period * plan.jitter * random.uniform(-1, 1, len(times) - 1)
-    return np.round(times, 5)
+    return np.round(times[times >= plan.begins], 5)
 
 
 def reading(random, signal, rate, noise):
@@ -435,8 +441,7 @@ def write_case(random, name, case, runs, out):
         "specimen": vars(case.specimen),
         "relaxed": case.plans[0].experiment.relaxed,
         "recordings": [
-            {"load_mass": p.mass, **{of: getattr(p, of) for of in ("excitation", "edges", "columns", "rate", "jitter")}}
-            for p in case.plans
+            {"load_mass": plan.mass, **{of: getattr(plan, of) for of in SHOWN_OF_PLAN}} for plan in case.plans
         ],
         "noise": case.noise,
         "noise_rms": noise_rms(errors),
@@ -519,6 +524,7 @@ def add_options(parser):
     parser.add_argument(
         "--edges", choices=EDGES, help="how the command turns; default: rounded in six of ten cases, else sharp"
     )
+    parser.add_argument("--cut", action="store_true", help="recordings begin on the way, and not at rest")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side")
     parser.add_argument(
         "--long",
@@ -539,7 +545,7 @@ def main():
     add_options(parser)
     options = parser.parse_args()
     truths = wanted_truths(options.effects, options.cases, options.seed)
-    kind = Kind(options.severity, options.same_form, options.session, options.edges)
+    kind = Kind(options.severity, options.same_form, options.session, options.edges, options.cut)
     write_cases(truths, kind, options.seed, options.out, options.jobs)
 
 

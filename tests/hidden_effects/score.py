@@ -45,7 +45,8 @@ def fresh_seed():
 def wanted_runs(options):
     severities = [float(severity) for severity in options.severity.split(",")]
     same_form = {None: [False], "beside": [False, True], "only": [True]}[options.same_form]
-    return [Run(severity, same, options.session, options.edges) for severity in severities for same in same_form]
+    what = (options.session, options.edges, options.cut)
+    return [Run(severity, same, *what) for severity in severities for same in same_form]
 
 
 def score_run(run, options, seed, known, folder):

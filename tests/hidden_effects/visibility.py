@@ -81,7 +81,7 @@ def visibility(case, runs, references):
     """
     rows = {}
     for plan, run, own in zip(case.plans, runs, references, strict=True):
-        at = run.time[::10]
+        at = run.time[run.time >= plan.begins][::10]
         truth, nominal, *changed = (course.signals(at) for course in (run, *own))
         inputs = {"command"} if plan.mass else {"command", "contraction"}
         for name in set(plan.columns) - inputs:
