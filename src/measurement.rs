@@ -763,7 +763,8 @@ mod tests {
         assert_eq!(recording.bridged(GaugePressure).unwrap()[3], 3e5);
         assert!((recording.get(Contraction).unwrap()[4] - 0.008).abs() < 1e-15);
         assert_eq!(recording.load_mass(), Some(20.0));
-        assert_eq!(recording.notes, ["column `remark` is not used"]);
+        let at_once = "the load moves at the start: simulations begin at 0.0 mm with 200 mm/s";
+        assert_eq!(recording.notes, ["column `remark` is not used", at_once]);
     }
 
     #[test]

@@ -284,7 +284,7 @@ pub fn masses(parameters: &Parameters, contraction: f64) -> (f64, f64) {
 }
 
 /// Name of the contraction in m where the muscle would be longer than its threads, or shorter than nothing.
-fn stretched_apart(parameters: &Parameters, contraction: f64) -> Option<&'static str> {
+pub(crate) fn stretched_apart(parameters: &Parameters, contraction: f64) -> Option<&'static str> {
     let length = parameters.muscle.rest_length - contraction;
     (!(0.0..=parameters.muscle.thread_length).contains(&length)).then_some("muscle.contraction")
 }

@@ -3,7 +3,7 @@
 use crate::load::InitialMotion;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
-use crate::plant::{hanging_contraction, steady_pressure};
+use crate::plant::{hanging_contraction, steady_pressure, stretched_apart};
 use crate::quality::sensors::resolution;
 use crate::quality::{quantile, span as span_of};
 use crate::simulation::{mean, slope};
@@ -131,7 +131,7 @@ impl Motion {
         if samples < MOTION_SAMPLES || span > TOO_LONG {
             return None;
         }
-        let readings = DVector::from_column_slice(&contraction[..samples]);
+        let readings = DVector::from_fn(samples, |k, _| contraction[k] - contraction[0]);
         let powers =
             OMatrix::<f64, Dyn, Const<5>>::from_fn(samples, |k, column| (after(k) / span).powi(POWERS[column]));
         let left = samples - POWERS.len();
@@ -149,18 +149,27 @@ impl Motion {
         }
         let covariance = (powers.transpose() * &powers).try_inverse()?;
         let [of_rate, of_place] = [0, 2].map(|k| deviation * covariance[(k, k)].sqrt());
-        Some(Self { contraction: all[2], velocity: all[0] / span, deviations: [of_place, of_rate / span] })
+        Some(Self {
+            contraction: contraction[0] + all[2],
+            velocity: all[0] / span,
+            deviations: [of_place, of_rate / span],
+        })
     }
 }
 
-/// How the load of a recording moves at the start of its simulation, the gauge pressure at the start known.
+/// How the load of a recording moves at the start of its simulation, the gauge pressure at the start known; not at all where no muscle
+/// could be as long as its readings say.
 pub fn initial_motion(parameters: &Parameters, recording: &Recording) -> InitialMotion {
     let Some(Motion { contraction, velocity, .. }) = recording.motion() else { return InitialMotion::default() };
     let truth = |reading: f64| parameters.effects.true_contraction(reading, 0.0, 0.0);
     let contraction_velocity = truth(contraction + velocity) - truth(contraction);
     let contraction = truth(contraction) + parameters.effects.contraction_delay() * contraction_velocity;
-    let contraction_offset = hanging_contraction(parameters, 0.0).map_or(0.0, |hanging| contraction - hanging);
-    InitialMotion { contraction_offset, contraction_velocity }
+    match hanging_contraction(parameters, 0.0) {
+        Ok(hanging) if stretched_apart(parameters, contraction).is_none() => {
+            InitialMotion { contraction_offset: contraction - hanging, contraction_velocity }
+        }
+        _ => InitialMotion::default(),
+    }
 }
 
 #[cfg(test)]
