@@ -119,88 +119,117 @@ fn is_off_in_two_ways(nominal: &Parameters) -> bool {
 /// Those of the simulation of the nominal model.
 pub fn better<'a>(taken: &'a [Taken<'a>], fitting: &'a Fitting<'a>) -> Result<(Found<'a>, Data<'a>)> {
     let lines = &taken[0];
-    let mut data = vec![lines.data()?]; // a model that cannot be simulated at all is the user's to mend
     if taken.len() == 1 {
-        return Ok((lines.searched(fitting)?, data.remove(0)));
+        let data = lines.data()?; // a model that cannot be simulated at all is the user's to mend
+        return Ok((lines.searched(fitting)?, data));
     }
+    let data = taken.iter().map(Taken::data).collect::<Result<_>>()?;
     let first = lines.first_way()?;
-    let mut benches = Vec::new();
-    for other in &taken[1..] {
-        data.push(other.data()?);
-        benches.push(other.bench(first.bench().off)?);
-    }
+    let benches = taken[1..].iter().map(|other| other.bench(first.bench().off)).collect::<Result<_>>()?;
+    let mut compared = Compared { taken, data, benches };
     let anew = |way: usize| -> Result<_> { Ok((way, taken[way].searched(fitting)?)) };
-    let (way, found) = if let Some(way) = needed_at_once(&first, &benches, &data) {
+    let (way, found) = if let Some(way) = compared.needed_at_once(&first) {
         anew(way)?
     } else {
         let begun = lines.begun(first, fitting)?;
-        match needed_by_singles(&begun, &benches, &data) {
+        match compared.needed_by_singles(&begun) {
             Some(way) => anew(way)?,
             None => (0, lines.ended(begun, fitting)?),
         }
     };
-    let (way, found) = match needed_in_the_end(&found, way, taken, &data) {
+    let (way, found) = match compared.needed_in_the_end(&found, way) {
         Some(other) => anew(other)?,
         None => (way, found),
     };
-    Ok((found, data.swap_remove(way)))
+    Ok((found, compared.data.swap_remove(way)))
 }
 
-/// Which other way explains what the nominal model leaves far better, and no worse than a dead time would.
-fn needed_at_once(way: &Way, benches: &[Bench], data: &[Data]) -> Option<usize> {
-    let (bench, baseline) = (way.bench(), way.baseline());
-    let own = losses(&data[0], &data[0], baseline)?;
-    let (best, going) = far_better(&[own], again(baseline, benches, data))?;
-    let dead_time = Effects::description("valve_dead_time")?;
-    let start = bench.starts(baseline, dead_time).into_iter().next()?;
-    let late = Hypothesis::default().with(start.part);
-    let late = losses(&data[0], &data[0], &bench.exact_fit(&late, &start.parameters, Scope::All)?)?;
-    (odds(&late, &going, -1.0) >= 0.0).then_some(best)
+/// Recordings as they were taken in all ways, straight lines first.
+struct Compared<'a> {
+    taken: &'a [Taken<'a>],
+    /// All samples.
+    data: Vec<Data<'a>>,
+    /// Of the ways beside straight lines.
+    benches: Vec<Bench<'a>>,
 }
 
-/// Which other way explains the data far better with one of the best single effects than these do.
-fn needed_by_singles(begun: &Begun, benches: &[Bench], data: &[Data]) -> Option<usize> {
-    let singles: Vec<&Fitted> = begun.singles().take(TRIED).collect();
-    let own = singles.iter().map(|single| losses(&data[0], &data[0], single)).collect::<Option<Vec<_>>>()?;
-    let others = singles.into_iter().flat_map(|single| again(single, benches, data));
-    far_better(&own, others).map(|(best, _)| best)
-}
-
-/// Which other way explains the data far better with the causes that were found in the one that was thought best, and a good part of what they
-/// leave there; none is needed where at most one cause leaves nothing.
-fn needed_in_the_end(found: &Found, best: usize, taken: &[Taken], data: &[Data]) -> Option<usize> {
-    if found.leaves_nothing_by_one() {
-        return None;
+impl Compared<'_> {
+    /// Which other way explains what the nominal model leaves far better, and no worse than a dead time would.
+    fn needed_at_once(&self, way: &Way) -> Option<usize> {
+        let (bench, baseline) = (way.bench(), way.baseline());
+        let own = self.losses(0, 0, baseline)?;
+        let (best, going) = self.far_better_again(&[own], [baseline].into_iter())?;
+        let dead_time = Effects::description("valve_dead_time")?;
+        let start = bench.starts(baseline, dead_time).into_iter().next()?;
+        let late = Hypothesis::default().with(start.part);
+        let late = self.losses(0, 0, &bench.exact_fit(&late, &start.parameters, Scope::All)?)?;
+        (odds(&late, &going, -1.0) >= 0.0).then_some(best)
     }
-    let fitted = &found.chosen.best;
-    let own = losses(&data[best], &data[best], fitted)?;
-    let others = (0..taken.len()).filter(|other| *other != best).filter_map(|other| {
-        let bench = taken[other].bench(found.bench().off).ok()?;
-        let again = bench.exact_fit(&fitted.hypothesis, &fitted.parameters, Scope::All)?;
-        Some((other, losses(&data[best], &data[other], &again)?))
-    });
-    let is_worth_it = |other: &[Loss]| explained(&own, other, &data[best]) >= MAY_COME_FURTHER;
-    far_better(std::slice::from_ref(&own), others.filter(|(_, other)| is_worth_it(other))).map(|(best, _)| best)
+
+    /// Which other way explains the data far better with one of the best single effects than these do.
+    fn needed_by_singles(&self, begun: &Begun) -> Option<usize> {
+        let singles: Vec<&Fitted> = begun.singles().take(TRIED).collect();
+        let own = singles.iter().map(|single| self.losses(0, 0, single)).collect::<Option<Vec<_>>>()?;
+        self.far_better_again(&own, singles.into_iter()).map(|(best, _)| best)
+    }
+
+    /// Which other way explains the data far better with the causes that were found in the one that was thought best, and a good part of what
+    /// they leave there; none is needed where at most one cause leaves nothing.
+    fn needed_in_the_end(&self, found: &Found, now: usize) -> Option<usize> {
+        if found.leaves_nothing_by_one() {
+            return None;
+        }
+        let fitted = &found.chosen.best;
+        let own = self.losses(now, now, fitted)?;
+        let others = (0..self.taken.len()).filter(|other| *other != now).filter_map(|other| {
+            let again = self.exact_fit_again(fitted, other, found.bench().off)?;
+            Some((other, self.losses(now, other, &again)?))
+        });
+        let is_worth_it = |other: &[Loss]| explained(&own, other, &self.data[now]) >= MAY_COME_FURTHER;
+        let is_needed = |other: &[Loss]| is_worth_it(other) && is_far_better(std::slice::from_ref(&own), other);
+        best(others.filter(|(_, other)| is_needed(other))).map(|(best, _)| best)
+    }
+
+    /// The best way beside straight lines with one of several fits to these, if it explains the data far better than all own ones, and what a
+    /// rough fit leaves there. Rough fits of coefficients that are off as a whole do not tell two such ways from each other.
+    fn far_better_again<'f>(
+        &self,
+        own: &[Vec<Loss>],
+        fits: impl Iterator<Item = &'f Fitted>,
+    ) -> Option<(usize, Vec<Loss>)> {
+        let each = fits.flat_map(|fitted| (1..).zip(&self.benches).map(move |(way, bench)| (way, bench, fitted)));
+        let rough = each.filter_map(|(way, bench, fitted)| {
+            let again = bench.rough_fit_again(fitted)?;
+            Some((way, self.losses(0, way, &again)?, again))
+        });
+        let better: Vec<_> = rough.filter(|(_, losses, _)| is_far_better(own, losses)).collect();
+        let are_of_one_way = better.iter().all(|(way, ..)| *way == better[0].0);
+        let precise = better.iter().filter(|_| !are_of_one_way).filter_map(|(way, _, rough)| {
+            let most = Off::most(self.taken[*way].nominal);
+            Some((*way, self.losses(0, *way, &self.exact_fit_again(rough, *way, most)?)?))
+        });
+        let likely = best(precise).map(|(way, _)| way);
+        let is_likely = |way: usize| likely.is_none_or(|likely| way == likely);
+        best(better.into_iter().map(|(way, losses, _)| (way, losses)).filter(|(way, _)| is_likely(*way)))
+    }
+
+    /// A fit to the end of the same causes in another way.
+    fn exact_fit_again(&self, fitted: &Fitted, way: usize, off: Off) -> Option<Fitted> {
+        self.taken[way].bench(off).ok()?.exact_fit(&fitted.hypothesis, &fitted.parameters, Scope::All)
+    }
+
+    /// Losses of a fit to recordings that were taken in one way, as the noise of a judging one has them.
+    fn losses(&self, judge: usize, way: usize, fitted: &Fitted) -> Option<Vec<Loss>> {
+        Some(self.data[judge].losses(&self.data[way].residuals(&fitted.parameters)?, Scope::All))
+    }
 }
 
-/// Losses of fits of the same causes to the recordings as they were taken in the other ways.
-fn again<'f>(
-    fitted: &'f Fitted,
-    benches: &'f [Bench],
-    data: &'f [Data],
-) -> impl Iterator<Item = (usize, Vec<Loss>)> + 'f {
-    let each = (1..).zip(benches);
-    each.filter_map(|(way, bench)| Some((way, losses(&data[0], &data[way], &bench.rough_fit_again(fitted)?)?)))
+/// Whether a fit in another way explains the data far better than all own ones.
+fn is_far_better(own: &[Vec<Loss>], other: &[Loss]) -> bool {
+    own.iter().all(|own| gain(own, other) > LEAST_EVIDENCE)
 }
 
-/// The best of fits in other ways that explain the data far better than all own ones.
-fn far_better(own: &[Vec<Loss>], others: impl Iterator<Item = (usize, Vec<Loss>)>) -> Option<(usize, Vec<Loss>)> {
-    let is_far_better = |other: &[Loss]| own.iter().all(|own| gain(own, other) > LEAST_EVIDENCE);
-    let better = others.filter(|(_, other)| is_far_better(other));
-    better.reduce(|best, next| if gain(&best.1, &next.1) > 0.0 { next } else { best })
-}
-
-/// Losses of a fit to recordings that were taken in one way, as the noise of another one has them.
-fn losses(judge: &Data, data: &Data, fitted: &Fitted) -> Option<Vec<Loss>> {
-    Some(judge.losses(&data.residuals(&fitted.parameters)?, Scope::All))
+/// The one of several fits in other ways that explains most.
+fn best(others: impl Iterator<Item = (usize, Vec<Loss>)>) -> Option<(usize, Vec<Loss>)> {
+    others.reduce(|best, next| if gain(&best.1, &next.1) > 0.0 { next } else { best })
 }
