@@ -19,7 +19,7 @@ use crate::parameters::Parameters;
 /// Seconds between samples that fits use, about: two hundred a second resolve the fastest effect, and more only take longer.
 /// Of long recordings a hundred do, where more would be above [`MANY_SAMPLES`] in all.
 const PERIODS: (f64, f64) = (5e-3, 1e-2);
-const MANY_SAMPLES: f64 = 13e3;
+const MANY_SAMPLES: f64 = 1e4;
 
 /// Accuracy of the integration in fits. Ten times the tolerance is far below all noise, too, but makes derivatives by differences so rough
 /// that fits of dry friction get stuck; with [`Accuracy::USUAL`] it takes half as long again. No start of an effect takes as
