@@ -119,11 +119,11 @@ fn is_off_in_two_ways(nominal: &Parameters) -> bool {
 /// Those of the simulation of the nominal model.
 pub fn better<'a>(taken: &'a [Taken<'a>], fitting: &'a Fitting<'a>) -> Result<(Found<'a>, Data<'a>)> {
     let lines = &taken[0];
+    // A model that cannot be simulated at all is the user's to mend.
+    let mut data = taken.iter().map(Taken::data).collect::<Result<Vec<_>>>()?;
     if taken.len() == 1 {
-        let data = lines.data()?; // a model that cannot be simulated at all is the user's to mend
-        return Ok((lines.searched(fitting)?, data));
+        return Ok((lines.searched(fitting)?, data.remove(0)));
     }
-    let data = taken.iter().map(Taken::data).collect::<Result<_>>()?;
     let first = lines.first_way()?;
     let benches = taken[1..].iter().map(|other| other.bench(first.bench().off)).collect::<Result<_>>()?;
     let mut compared = Compared { taken, data, benches };
