@@ -86,6 +86,15 @@ fn effects_agree_with_scipy() {
                 ("creep.nominal_share", 0.5),
             ],
         ),
+        (
+            "spectrum_creep",
+            &[
+                ("creep.spectrum_amplitude", 0.12),
+                ("creep.spectrum_exponent", 0.3),
+                ("creep.relaxed_share", 0.0),
+                ("creep.settled_share", 0.5),
+            ],
+        ),
         ("pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5)]),
         ("uneven_pull_creep", &[("creep.pull_amplitude", 0.2), ("creep.time_1", 2.5), ("creep.return_ratio", 3.0)]),
         (

@@ -13,6 +13,9 @@ crate::variables::variables! {
     /// Where pressure drives it, dᵢ goes for aᵢ (x − x_r) + bᵢ (p − p_r)/2 bar, `pressure_drift_1` b₁ and `pressure_drift_2` b₂, and
     /// braid and membrane feel n (b₁ + b₂) p/2 bar more; p_r is to p what x_r is to x, and dᵢ(0) the settled share of all of that. A braid
     /// that goes on widening has b > 0, threads that go on stretching b < 0.
+    /// Rubber often creeps with no single time, as a power of time or its logarithm: six more elements share `spectrum_amplitude` a,
+    /// sₖ a each, with sₖ ∝ τₖ^e, Σ sₖ = 1, e the `spectrum_exponent`, and fixed times τₖ from 0.2 s to 300 s at equal ratios. Each of them has settled at the
+    /// start as far as it would in the time in which one of 10 s settles by `settled_share`.
     /// A standard linear solid is stiffer for fast changes: springs kᵢ in parallel with the membrane, `relaxing_stiffness_1` and
     /// `relaxing_stiffness_2`, pull back with kᵢ eᵢ, deᵢ/dt = dx/dt − sinh(β eᵢ)/(β τᵢ), with `return_ratio` τᵢ while eᵢ < 0: β is
     /// `activation`, by which what yields thermally yields more readily under stress.
@@ -30,7 +33,7 @@ crate::variables::variables! {
     /// Kelvin–Voigt model and standard linear solid of viscoelasticity; for muscles T. Minh et al. (2010),
     /// doi 10.1016/j.mechatronics.2010.04.003 (creep and hysteresis of a McKibben muscle). That rubber recovers at another
     /// pace than it gives way, and Eyring's activated flow: I. Ward, J. Sweeney (2012), Mechanical Properties of Solid Polymers,
-    /// ch. 11 and 12.
+    /// ch. 11 and 12. Power law of time: W. Findley, J. Lai, K. Onaran (1976), Creep and Relaxation of Nonlinear Viscoelastic Materials.
     pub struct Creep in "creep." as Tunable {
         /// Drift per contraction, first element
         amplitude_1: f64 = 0.0, ONE, (AHEAD..=1.0);
@@ -56,6 +59,10 @@ crate::variables::variables! {
         relaxing_stiffness_1: f64 = 0.0, NEWTON_PER_METRE, (0.0..=5e4);
         /// Stiffness that relaxes with the second time constant
         relaxing_stiffness_2: f64 = 0.0, NEWTON_PER_METRE, (0.0..=5e4);
+        /// Drift per contraction, all elements of the spectrum
+        spectrum_amplitude: f64 = 0.0, ONE, (AHEAD..=1.0);
+        /// Power of its time with which the share of an element of the spectrum grows
+        spectrum_exponent: f64 = 0.0, ONE, (-1.0..=1.0);
         /// Time in which a drift goes back, relative to that in which it grows
         return_ratio: f64 = 1.0, ONE, (0.05..=20.0);
         /// Activation of the flow of what relaxes, per stretch; zero is a linear dashpot
@@ -67,6 +74,14 @@ crate::variables::variables! {
 const SLOW: f64 = 0.2;
 /// Longest time constant in s; a stiffness that takes that long to relax is a spring that was put in at the start.
 const SLOWEST: f64 = 300.0;
+/// Elements of a spectrum of times, and the time of its first one in s. From there to [`SLOWEST`] they follow powers of time up to 0.5, and its
+/// logarithm, between 0.3 and 60 s to 0.3 % rms.
+const ELEMENTS: usize = 6;
+const FASTEST: f64 = 0.2;
+/// Time in s of the element for which the settled share is stated.
+const SETTLING: f64 = 10.0;
+/// Where the states of the spectrum begin.
+const SPECTRUM: usize = 8;
 /// Argument beyond which flow grows no more, 6800 times as fast as a linear dashpot's: an integration can still follow it.
 const LARGEST_SINH: f64 = 12.0;
 /// Share of the larger of two opposite drifts that the smaller one takes back from which on it is no creep: nothing gives way for good, and
@@ -78,6 +93,20 @@ const AHEAD: f64 = -0.5;
 /// Whether one of two drifts takes most of the other one back.
 fn is_taken_back([first, second]: [f64; 2]) -> bool {
     first * second < 0.0 && first.abs().min(second.abs()) > TAKEN_BACK * first.abs().max(second.abs())
+}
+
+/// Ratio of the times of neighbours in the spectrum.
+fn spacing() -> f64 {
+    (SLOWEST / FASTEST).powf(1.0 / (ELEMENTS - 1) as f64)
+}
+
+/// Values of the elements of the spectrum, each so many times the one before.
+fn each_of_spectrum(first: f64, ratio: f64) -> [f64; ELEMENTS] {
+    let mut value = first / ratio;
+    [(); ELEMENTS].map(|()| {
+        value *= ratio;
+        value
+    })
 }
 
 impl Creep {
@@ -100,6 +129,20 @@ impl Creep {
         if goes_back { self.return_ratio * time } else { time }
     }
 
+    /// Shares of the elements of the spectrum in its amplitude.
+    fn shares(&self) -> [f64; ELEMENTS] {
+        let ratio = spacing().powf(self.spectrum_exponent);
+        let relative = each_of_spectrum(1.0, ratio);
+        let sum: f64 = relative.iter().sum();
+        relative.map(|share| share / sum)
+    }
+
+    /// Share of its amplitude by which the spectrum has given way at a time in s after a step.
+    fn given_way(&self, time: f64) -> f64 {
+        let each = self.shares().into_iter().zip(each_of_spectrum(FASTEST, spacing()));
+        each.map(|(share, own)| share * -(-time / own).exp_m1()).sum()
+    }
+
     /// Stretch in m that flows off within a time constant, from a stretch in m.
     fn flow(&self, stretch: f64) -> f64 {
         let argument = self.activation * stretch;
@@ -115,7 +158,7 @@ impl Effect for Creep {
     const DESCRIPTION: Description = Description {
         name: "creep",
         meaning: "slow visco-elastic drift of the membrane at constant pressure",
-        equation: "x <- x - d1 - d2 + n (a_1 + a_2) x;  tau_i d(d_i)/dt + d_i = a_i (x - x_r) + b_i (p - p_r)/2 bar;  x <- x + n (b_1 + b_2) p/2 bar;  A p <- A p + d_F;  F <- F - k_i e_i",
+        equation: "x <- x - d1 - d2 + n (a_1 + a_2) x;  tau_i d(d_i)/dt + d_i = a_i (x - x_r) + b_i (p - p_r)/2 bar;  x <- x + n (b_1 + b_2) p/2 bar;  x <- x - sum d_k, tau_k d(d_k)/dt + d_k = s_k a (x - x_r), s_k ~ tau_k^e;  A p <- A p + d_F;  F <- F - k_i e_i",
         signature: "drift over seconds at constant measured pressure",
         experiment: "hold for a minute after a step, up and down",
         reference: "Kelvin-Voigt; Minh et al. 2010",
@@ -127,7 +170,15 @@ impl Effect for Creep {
             &[("creep.relaxing_stiffness_1", &[1e3]), ("creep.time_1", &[1.5, 10.0])],
             &[("creep.pressure_drift_1", &[0.01, 0.01, -0.01, -0.01]), ("creep.time_1", &[1.5, 10.0, 1.5, 10.0])],
         ],
-        further_forms: &[],
+        further_forms: &[
+            &[("creep.spectrum_amplitude", &[0.15]), ("creep.spectrum_exponent", &[0.3])],
+            &[
+                ("creep.spectrum_amplitude", &[0.15]),
+                ("creep.spectrum_exponent", &[0.3]),
+                ("creep.relaxed_share", &[0.5]),
+                ("creep.settled_share", &[0.5]),
+            ],
+        ],
         refinements: &[
             ("creep.amplitude_2", &[0.05]),
             ("creep.time_2", &[15.0, 0.5]),
@@ -142,21 +193,24 @@ impl Effect for Creep {
         ],
     };
     /// Both drifts of the contraction, contraction and pull where nothing drifts, the drift of the pull, how far both springs are stretched,
-    /// and the relative pressure at which nothing drifts.
-    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e3, 1e3, 0.1, 0.1, 1.0];
+    /// the relative pressure at which nothing drifts, and the drifts of the spectrum.
+    const STATE_SCALES: &'static [f64] = &[0.1, 0.1, 0.1, 1e3, 1e3, 0.1, 0.1, 1.0, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1];
     const ENDS_INSIDE: &'static [&'static str] = &[
         "creep.amplitude_1",
         "creep.amplitude_2",
         "creep.pull_amplitude",
         "creep.pressure_drift_1",
         "creep.pressure_drift_2",
+        "creep.spectrum_amplitude",
+        "creep.spectrum_exponent",
         "creep.return_ratio",
     ];
 
     fn is_neutral(&self) -> bool {
         let Self { amplitude_1, amplitude_2, pull_amplitude, pressure_drift_1, pressure_drift_2, .. } = *self;
         let of_stretch = [self.relaxing_stiffness_1, self.relaxing_stiffness_2];
-        [amplitude_1, amplitude_2, pull_amplitude, pressure_drift_1, pressure_drift_2] == [0.0; 5]
+        [amplitude_1, amplitude_2, self.spectrum_amplitude, pull_amplitude, pressure_drift_1, pressure_drift_2]
+            == [0.0; 6]
             && of_stretch == [0.0; 2]
     }
 
@@ -174,6 +228,11 @@ impl Effect for Creep {
         own[..2].copy_from_slice(&self.aims(contraction, pressure).map(|aim| settled * aim));
         own[2..4].copy_from_slice(&[self.relaxed_share * contraction, at.pressure_pull]);
         own[7] = self.relaxed_share * pressure;
+        let aim = self.spectrum_amplitude * (1.0 - self.relaxed_share) * contraction;
+        let each = own[SPECTRUM..].iter_mut().zip(self.shares()).zip(each_of_spectrum(FASTEST, spacing()));
+        for ((drift, share), time) in each {
+            *drift = share * aim * (1.0 - (1.0 - self.settled_share).powf(SETTLING / time));
+        }
     }
 
     fn rates(&self, at: &Point, own: &[f64], rates: &mut [f64]) {
@@ -184,6 +243,12 @@ impl Effect for Creep {
         rates[4] = lack / self.time(lack * self.pull_amplitude < 0.0, self.time_1);
         for (k, time) in [(5, self.time_1), (6, self.time_2)] {
             rates[k] = at.contraction_velocity - self.flow(own[k]) / self.time(own[k] < 0.0, time);
+        }
+        if self.spectrum_amplitude != 0.0 {
+            let aim = self.spectrum_amplitude * (at.contraction - own[2]);
+            for (k, (share, time)) in self.shares().into_iter().zip(each_of_spectrum(FASTEST, spacing())).enumerate() {
+                rates[SPECTRUM + k] = self.rate(own[SPECTRUM + k], share * aim, time);
+            }
         }
     }
 
@@ -207,7 +272,9 @@ impl Effect for Creep {
             return contraction;
         }
         let known: f64 = self.aims(at.contraction, at.relative_pressure()).iter().sum();
-        contraction - own[0] - own[1] + self.nominal_share * known
+        let known = known + self.spectrum_amplitude * at.contraction;
+        let of_spectrum: f64 = own[SPECTRUM..].iter().sum();
+        contraction - own[0] - own[1] - of_spectrum + self.nominal_share * known
     }
 
     fn sentence(&self) -> String {
@@ -222,6 +289,12 @@ impl Effect for Creep {
         let mut all = Vec::new();
         if !parts.is_empty() {
             all.push(format!("of every change of length it gives way by {}", parts.join(" and ")));
+        }
+        if self.spectrum_amplitude != 0.0 {
+            let [after_one, after_all] = [1.0, 30.0].map(|time| 100.0 * self.spectrum_amplitude * self.given_way(time));
+            all.push(format!(
+                "of every change of length it gives way by {after_one:.1} % within 1 s and {after_all:.1} % within 30 s"
+            ));
         }
         if self.pull_amplitude != 0.0 {
             all.push(format!("the pull of the pressure grows by {}", one(self.pull_amplitude, self.time_1)));
@@ -252,5 +325,21 @@ mod tests {
             |first: f64, second: f64| Creep { pressure_drift_1: first, pressure_drift_2: second, ..Creep::default() };
         assert!([(0.02, 0.02), (0.02, -0.01), (-0.03, 0.0)].into_iter().all(|(a, b)| creep(a, b).is_plausible()));
         assert!(!creep(-0.067, 0.064).is_plausible());
+    }
+
+    #[test]
+    fn a_spectrum_gives_way_as_a_power_of_time() {
+        // Exponents of the spectrum that come nearest to powers of time between 0.3 s and 60 s, by least squares.
+        for (exponent, power) in [(0.117, 0.1), (0.343, 0.3), (0.607, 0.5)] {
+            let creep = Creep { spectrum_amplitude: 0.1, spectrum_exponent: exponent, ..Creep::default() };
+            let times: Vec<f64> = (0..=40).map(|k| 0.3 * 200.0_f64.powf(f64::from(k) / 40.0)).collect();
+            let share = |of: &dyn Fn(f64) -> f64, time: f64| (of(time) - of(0.3)) / (of(60.0) - of(0.3));
+            for time in times {
+                let given = share(&|time| creep.given_way(time), time);
+                let expected = share(&|time: f64| time.powf(power), time);
+                assert!((given - expected).abs() < 0.02, "{power}: {given} for {expected} at {time} s");
+            }
+            assert!((creep.shares().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
     }
 }

@@ -747,6 +747,7 @@ SINCE_HELD = [
     DampingOfPressure,
     EmptyingTank,
     FallingCeiling,
+    FractionalCreep,
     FungBladder,
     KneedGain,
     LiftingSeal,

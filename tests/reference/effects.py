@@ -107,6 +107,23 @@ class KnownCreep(Plant):
         return super().static_force(pressure, x - own[0] + 0.05 * x, own)
 
 
+class SpectrumCreep(Plant):
+    """Six elements whose shares in 12 % grow as their times to the power of 0.3, from the rest length, settled for 6.93 s."""
+
+    own_scales = (0.1,) * 6
+    times = np.geomspace(0.2, 300, 6)
+    shares = 0.12 * times**0.3 / np.sum(times**0.3)
+
+    def own_start(self, x):
+        return self.shares * x * (1 - np.exp(-10 * np.log(2) / self.times))
+
+    def own_rates(self, target, pressure, x, velocity, own):
+        return (self.shares * x - own) / self.times
+
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure, x - np.sum(own), own)
+
+
 class PullCreep(Plant):
     """A share of what the pressure pulled on the mean of the last seconds comes on top, less that of the start."""
 
@@ -834,6 +851,7 @@ CASES = [
     Case("creep", Creep(), STAIRS),
     Case("uneven_creep", UnevenCreep(), STAIRS),
     Case("known_creep", KnownCreep(), STAIRS),
+    Case("spectrum_creep", SpectrumCreep(), STAIRS),
     Case("pull_creep", PullCreep(), STAIRS),
     Case("uneven_pull_creep", UnevenPullCreep(), STAIRS),
     Case("known_pull_creep", KnownPullCreep(), STAIRS),
