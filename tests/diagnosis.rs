@@ -58,11 +58,16 @@ fn stairs_and_ramps(time: f64) -> f64 {
 
 /// A sound muscle at 50 samples a second with noise, from a gauge pressure in bar on, whose command goes so between its samples.
 fn sound_muscle(between: Between, start: f64) -> Recording {
-    Recording::parse(sound_muscle_as_text(between, start).as_bytes(), Path::new("sound.csv"), &[]).unwrap()
+    muscle(&Parameters::default(), between, start)
+}
+
+/// The same of another muscle.
+fn muscle(truth: &Parameters, between: Between, start: f64) -> Recording {
+    Recording::parse(muscle_as_text(truth, between, start).as_bytes(), Path::new("muscle.csv"), &[]).unwrap()
 }
 
 /// The same as a CSV file.
-fn sound_muscle_as_text(between: Between, start: f64) -> String {
+fn muscle_as_text(truth: &Parameters, between: Between, start: f64) -> String {
     let text = |shown: &dyn Fn(usize) -> String| {
         let row =
             |k: usize| format!("{:.2},{:.5},{},40\n", 0.02 * k as f64, stairs_and_ramps(0.02 * k as f64), shown(k));
@@ -71,7 +76,7 @@ fn sound_muscle_as_text(between: Between, start: f64) -> String {
     };
     let inputs = text(&|_| format!("{start},100"));
     let inputs = Recording::parse(inputs.as_bytes(), Path::new("inputs.csv"), &[]).unwrap().going(between);
-    let truth = replay(&Parameters::default(), &inputs).unwrap();
+    let truth = replay(truth, &inputs).unwrap();
     let [pressure, contraction] = [GaugePressure, Contraction].map(|signal| truth.get(signal).unwrap());
     let noise = |k: usize, by: f64| ((k * k) as f64 * by).sin() + ((k * k) as f64 * 1.7 * by).cos();
     text(&|k| {
@@ -90,6 +95,23 @@ fn a_command_that_changes_at_its_samples_is_no_cause() {
 }
 
 #[test]
+fn a_held_command_is_no_late_valve_beside_a_cause() {
+    let mut truth = Parameters::default();
+    (truth.effects.contraction_sensor_offset.offset, truth.effects.contraction_sensor_offset.settling) = (6e-3, 2e-3);
+    let found = diagnosis_of(&[muscle(&truth, Between::Held, stairs_and_ramps(0.0))]);
+    assert_eq!((causes(&found), found.between), (vec!["contraction_sensor_offset"], Between::Held));
+}
+
+#[test]
+fn a_second_cause_is_found_that_shapes_of_the_first_one_could_stand_for() {
+    let mut truth = Parameters::default();
+    (truth.effects.creep.spectrum_amplitude, truth.effects.creep.spectrum_exponent) = (0.2, 0.3);
+    truth.effects.end_effects.excess = 0.13;
+    let found = diagnosis_of(&[muscle(&truth, Between::Lines, stairs_and_ramps(0.0))]);
+    assert_eq!(causes(&found), ["creep", "end_effects"]);
+}
+
+#[test]
 fn a_recording_that_begins_while_the_pressure_still_rises_is_no_cause() {
     let found = diagnosis_of(&[sound_muscle(Between::Lines, 1.0)]);
     assert_eq!((found.verdict, causes(&found), found.between), (Verdict::Nominal, vec![], Between::Lines));
@@ -101,7 +123,7 @@ fn a_recording_that_begins_while_the_pressure_still_rises_is_no_cause() {
 #[test]
 fn a_recording_that_is_cut_out_of_a_longer_one_is_no_cause() {
     // From where the load swings on; every fiftieth of a second a reading.
-    let whole = sound_muscle_as_text(Between::Lines, stairs_and_ramps(0.0));
+    let whole = muscle_as_text(&Parameters::default(), Between::Lines, stairs_and_ramps(0.0));
     let mut rows = whole.lines();
     let header = rows.next().unwrap();
     let cut: String = rows.skip(155).map(|row| format!("{row}\n")).collect();

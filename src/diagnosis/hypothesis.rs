@@ -89,6 +89,11 @@ impl Part {
         self.effect.all_forms().nth(self.form).unwrap_or_default()
     }
 
+    /// Whether it has a common form and no refinement.
+    pub fn is_plain(self) -> bool {
+        self.refined == Which::NONE && !self.is_rare()
+    }
+
     /// Whether its form is none of the common ones.
     pub fn is_rare(self) -> bool {
         self.form >= self.effect.forms.len()

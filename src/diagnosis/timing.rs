@@ -5,10 +5,10 @@
 
 use super::Fitting;
 use super::fits::{Bench, Changes, Fitted};
-use super::hypothesis::{Hypothesis, Off};
+use super::hypothesis::{Hypothesis, Off, neutralised};
 use super::residuals::{self, Data, Loss, Scope};
 use super::selection::evidence::{explained, gain, odds};
-use super::selection::{LEAST_EVIDENCE, MAY_COME_FURTHER, MOST_EFFECTS};
+use super::selection::{LEAST_EVIDENCE, MAY_COME_FURTHER, MOST_EFFECTS, OUT_OF_REACH};
 use super::ways::{Begun, Found, Way};
 use crate::Result;
 use crate::effects::Effects;
@@ -174,20 +174,51 @@ impl Compared<'_> {
     }
 
     /// Which other way explains the data far better with the causes that were found in the one that was thought best, and a good part of what
-    /// they leave there; none is needed where at most one cause leaves nothing.
+    /// they leave there, or makes one of the causes needless.
     fn needed_in_the_end(&self, found: &Found, now: usize) -> Option<usize> {
-        if found.leaves_nothing_by_one() {
-            return None;
-        }
-        let fitted = &found.chosen.best;
-        let own = self.losses(now, now, fitted)?;
-        let others = (0..self.taken.len()).filter(|other| *other != now).filter_map(|other| {
-            let again = self.exact_fit_again(fitted, other, found.bench().off)?;
-            Some((other, self.losses(now, other, &again)?))
+        let own = self.losses(now, now, &found.chosen.best)?;
+        let others: Vec<usize> = (0..self.taken.len()).filter(|other| *other != now).collect();
+        let explains_more = || self.explains_more(found, now, &own, &others);
+        // None is needed to explain more where at most one cause leaves nothing.
+        let more = if found.leaves_nothing_by_one() { None } else { explains_more() };
+        more.or_else(|| self.needs_less(found, now, &own, &others))
+    }
+
+    /// Which of some other ways explains the data far better with the causes that were found in one.
+    fn explains_more(&self, found: &Found, now: usize, own: &[Loss], others: &[usize]) -> Option<usize> {
+        let again = others.iter().filter_map(|other| {
+            let again = self.exact_fit_again(&found.chosen.best, *other, found.bench().off)?;
+            Some((*other, self.losses(now, *other, &again)?))
         });
-        let is_worth_it = |other: &[Loss]| explained(&own, other, &self.data[now]) >= MAY_COME_FURTHER;
-        let is_needed = |other: &[Loss]| is_worth_it(other) && is_far_better(std::slice::from_ref(&own), other);
-        best(others.filter(|(_, other)| is_needed(other))).map(|(best, _)| best)
+        let is_worth_it = |other: &[Loss]| explained(own, other, &self.data[now]) >= MAY_COME_FURTHER;
+        let is_needed = |other: &[Loss]| is_worth_it(other) && is_far_better(&[own.to_vec()], other);
+        best(again.filter(|(_, other)| is_needed(other))).map(|(best, _)| best)
+    }
+
+    /// Which of some other ways is no less likely with one of the causes less than were found in one.
+    fn needs_less(&self, found: &Found, now: usize, own: &[Loss], others: &[usize]) -> Option<usize> {
+        let all = &found.chosen.best;
+        let fewer = all.hypothesis.parts.iter().map(|part| Fitted {
+            hypothesis: all.hypothesis.without(part.effect.name),
+            parameters: neutralised(&all.parameters, part.effect),
+            ..all.clone()
+        });
+        let each = fewer.flat_map(|fewer| others.iter().map(move |other| (*other, fewer.clone())));
+        let as_likely = each.filter_map(|(other, fewer)| {
+            let more = all.hypothesis.size() as f64 - fewer.hypothesis.size() as f64;
+            let odds_against = |losses: &[Loss]| odds(losses, own, more);
+            let bench = self.taken[other].bench(found.bench().off).ok()?;
+            let rough = bench.rough_fit_again(&fewer)?;
+            // The end of a fit that is far away changes nothing.
+            let samples: f64 = own.iter().map(|loss| loss.effective).sum();
+            if odds_against(&self.losses(now, other, &rough)?) > 0.5 * samples * OUT_OF_REACH.ln() {
+                return None;
+            }
+            let again = bench.exact_fit(&fewer.hypothesis, &rough.parameters, Scope::All)?;
+            let losses = self.losses(now, other, &again)?;
+            (odds_against(&losses) <= 0.0).then_some((other, losses))
+        });
+        best(as_likely).map(|(best, _)| best)
     }
 
     /// The best way beside straight lines with one of several fits to these, if it explains the data far better than all own ones, and what a

@@ -47,13 +47,16 @@ impl<'a> Way<'a> {
 
     /// Looks for at most so many effects; `fitting` is told those of each fit. `None` where a model cannot be simulated.
     pub fn searched(self, most: usize, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
-        Found::of(self.looked_over(fitting), most)
+        Found::of(self.looked_over(fitting), most).map(|found| found.or_two(None))
     }
 
     fn looked_over(self, fitting: &'a Fitting<'a>) -> Search<'a> {
         Search::new(self.bench, self.baseline, self.allows_most, fitting)
     }
 }
+
+/// What was found, and the search in the other way, if there was one.
+type Both<'a> = (Found<'a>, Option<Search<'a>>);
 
 /// The better one of two ways, of which the second allows more: what is known of the first one's single effects, before either is searched.
 pub struct Begun<'a> {
@@ -82,13 +85,18 @@ impl<'a> Begun<'a> {
     /// # Errors
     /// Those of preparing the second way.
     pub fn better(self, wide: impl Fn() -> Result<Way<'a>>, fitting: &'a Fitting<'a>) -> Result<Option<Found<'a>>> {
+        Ok(self.both(wide, fitting)?.map(|(found, other)| found.or_two(other)))
+    }
+
+    /// What was found, and the search in the way where less was, if there was one.
+    fn both(self, wide: impl Fn() -> Result<Way<'a>>, fitting: &'a Fitting<'a>) -> Result<Option<Both<'a>>> {
         let Self { mut narrow, at_once } = self;
         // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
         let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
         if at_once.is_none() {
             let Some(found) = Found::of(narrow, 1) else { return Ok(None) };
             if found.finds_nothing() {
-                return Ok(Some(found));
+                return Ok(Some((found, None)));
             }
             narrow = found.search;
         }
@@ -96,7 +104,8 @@ impl<'a> Begun<'a> {
         if let Some(wins) = wins_alone(&mut narrow, &mut wide) {
             let winner = if wins { &mut narrow } else { &mut wide };
             if let Some(chosen) = winner.up_to(1).filter(Chosen::names_causes) {
-                return Ok(Some(Found { search: if wins { narrow } else { wide }, chosen }));
+                let (search, other) = if wins { (narrow, wide) } else { (wide, narrow) };
+                return Ok(Some((Found { search, chosen }, Some(other))));
             }
         }
         let Some(mut found) = Found::of(narrow, most.min(AT_FIRST)) else { return Ok(None) };
@@ -112,7 +121,8 @@ impl<'a> Begun<'a> {
         }
         let wins =
             found.best().beats(&other.best()) && other.refused().is_none_or(|refused| found.best().beats(&refused));
-        Ok(Some(if wins { found } else { other }))
+        let (found, other) = if wins { (found, other) } else { (other, found) };
+        Ok(Some((found, Some(other.search))))
     }
 }
 
@@ -175,6 +185,29 @@ impl<'a> Found<'a> {
             0 => MOST_EFFECTS,
             _ if !self.best().says_all() || self.bench().strain(&self.chosen.best) > LEAST_EVIDENCE => MOST_EFFECTS,
             causes => (causes - 1).max(1),
+        }
+    }
+
+    /// Two causes in plain forms in the place of a single one in no plain form, where they are better. Coefficients that are off may stand for the
+    /// second one, so that it is looked for where they may be in the way that allows most: here, or in another search.
+    fn or_two(mut self, other: Option<Search<'a>>) -> Self {
+        let [part] = self.chosen.best.hypothesis.parts[..] else { return self };
+        if part.is_plain() {
+            return self;
+        }
+        let single = self.chosen.best.clone();
+        if self.search.allows_most() {
+            let two = self.search.as_two(&single);
+            let is_better = |two: &Chosen| Best { search: &self.search, fitted: &two.best }.beats(&self.best());
+            self.chosen = two.filter(is_better).unwrap_or(self.chosen);
+            return self;
+        }
+        let Some(mut search) = other else { return self };
+        match search.as_two(&single) {
+            Some(chosen) if (Best { search: &search, fitted: &chosen.best }).beats(&self.best()) => {
+                Self { search, chosen }
+            }
+            _ => self,
         }
     }
 

@@ -16,7 +16,7 @@ const MAY_RIVAL: f64 = 0.7;
 const MAY_BE_RIVALS: usize = 5;
 /// How many times what a rival may leave a fit must leave for its end not to be worth the time: of 395 ends of fits none took off more than
 /// five sixths.
-const OUT_OF_REACH: f64 = 10.0;
+pub const OUT_OF_REACH: f64 = 10.0;
 
 impl Search<'_> {
     /// Hypotheses refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
@@ -49,7 +49,7 @@ impl Search<'_> {
         sorted(all)
     }
 
-    fn finished(&self, judged: Judged) -> Judged {
+    pub(super) fn finished(&self, judged: Judged) -> Judged {
         let start = self.bench.scanned(&judged.fitted);
         self.bench
             .exact_fit(&judged.fitted.hypothesis, &start, Scope::All)
@@ -124,7 +124,7 @@ impl Search<'_> {
     }
 
     /// The hypothesis with one of its effects in another form that is wanted, the best of these: of the starts only the most promising were fitted.
-    fn in_other_forms(&self, judged: &Judged, is_wanted: impl Fn(Part) -> bool) -> Option<Judged> {
+    pub(super) fn in_other_forms(&self, judged: &Judged, is_wanted: impl Fn(Part) -> bool) -> Option<Judged> {
         let parts = &judged.fitted.hypothesis.parts;
         let others = parts.iter().flat_map(|own| {
             let forms = self.bench.forms(own.effect).filter(|part| part.form != own.form && is_wanted(*part));

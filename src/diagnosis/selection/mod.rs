@@ -4,6 +4,7 @@ pub mod evidence;
 mod forms;
 mod makeshift;
 mod naming;
+mod plain;
 
 use super::Fitting;
 use super::Verdict;
@@ -13,6 +14,7 @@ use super::residuals::{Loss, Scope};
 use crate::effects::Effects;
 use crate::measurement::Signal;
 use evidence::*;
+pub use forms::OUT_OF_REACH;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -139,6 +141,11 @@ impl<'a> Search<'a> {
         search.levels = vec![search.judged_anew(singles)];
         search.unlisted = search.best_unlisted();
         search
+    }
+
+    /// Whether no other search lets the coefficients be off in a way that allows more.
+    pub fn allows_most(&self) -> bool {
+        self.minds_form
     }
 
     /// The single effects that are fitted so far, the best first.

@@ -40,9 +40,15 @@ struct Told {
 
 impl Search<'_> {
     pub(super) fn choose(&self) -> Option<Chosen> {
-        let Some(best) = self.leading().map(|best| self.assured(self.pruned(best.clone()))) else {
-            return self.unnamed(None);
-        };
+        match self.leading() {
+            Some(best) => self.chosen(best.clone()),
+            None => self.unnamed(None),
+        }
+    }
+
+    /// What is said where a hypothesis leads.
+    pub(super) fn chosen(&self, best: Judged) -> Option<Chosen> {
+        let best = self.assured(self.pruned(best));
         match self.as_told(&best) {
             Some(told) => self.named(best, told),
             None => self.unnamed(Some(&best)),

@@ -1,0 +1,40 @@
+//! Two causes in plain forms where the refinements of a single one may stand for the second: a shape more fits what a cause of its own does.
+
+use super::evidence::is_unsound;
+use super::{Chosen, Judged, MAY_GO_FURTHER, Search, first_of_each, possible, sorted};
+use crate::diagnosis::fits::Fitted;
+use crate::diagnosis::hypothesis::{Hypothesis, Part};
+use crate::diagnosis::residuals::Scope;
+use rayon::prelude::*;
+
+impl Search<'_> {
+    /// The single cause of a fit in a plain form, and one beside it that explains what it leaves then, as it is told; `None` where it leaves
+    /// nothing, or no other cause explains it.
+    pub fn as_two(&mut self, single: &Fitted) -> Option<Chosen> {
+        let [part] = single.hypothesis.parts[..] else { return None };
+        let plain = self.in_plain_form(single, part)?;
+        if !is_unsound(&plain.fitted.losses, &self.bench.data) {
+            return None;
+        }
+        let mut both = self.extend(&plain.fitted, true, &self.from);
+        both.retain(|both| self.further(&plain, both) > MAY_GO_FURTHER);
+        // The form that does best alone need not be the one that does beside another cause.
+        let is_of_first = |form: Part| form.effect.name == part.effect.name;
+        let others = both.par_iter().filter_map(|both| self.in_other_forms(both, is_of_first)).collect::<Vec<_>>();
+        both.extend(others);
+        let both = both.into_par_iter().map(|both| self.finished(both)).collect();
+        let both = first_of_each(sorted(both).into_iter());
+        let best = possible(&both)?.clone();
+        self.levels.truncate(1);
+        self.levels.push(both);
+        self.chosen(best).filter(|chosen| chosen.best.hypothesis.parts.len() == 2)
+    }
+
+    /// The cause of a fit, be it one to the same data in another way, in the form that does best without refinements.
+    fn in_plain_form(&self, single: &Fitted, part: Part) -> Option<Judged> {
+        let own = Hypothesis { parts: vec![Part::plain(part.effect, part.form)], beside: None };
+        let own = self.judge(self.bench.exact_fit(&own, &single.parameters, Scope::All)?);
+        let other = self.in_other_forms(&own, |_| true).map(|other| self.finished(other));
+        other.into_iter().chain([own]).max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+}
