@@ -8,8 +8,9 @@ use crate::diagnosis::residuals::Scope;
 use rayon::prelude::*;
 
 impl Search<'_> {
-    /// The single cause of a fit in a plain form, and one beside it that explains what it leaves then, as it is told; `None` where it leaves
-    /// nothing, or no other cause explains it.
+    /// The single cause of a fit in a plain form, and one beside it that explains all that it leaves then, as they are told; `None` where it leaves
+    /// nothing, or no other cause explains it: where both leave something, the second may as well stand for the first one's form. Measured seals got a
+    /// second cause so.
     pub fn as_two(&mut self, single: &Fitted) -> Option<Chosen> {
         let [part] = single.hypothesis.parts[..] else { return None };
         let plain = self.in_plain_form(single, part)?;
@@ -24,7 +25,8 @@ impl Search<'_> {
         both.extend(others);
         let both = both.into_par_iter().map(|both| self.finished(both)).collect();
         let both = first_of_each(sorted(both).into_iter());
-        let best = possible(&both)?.clone();
+        let says_all = |both: &&Judged| !is_unsound(&both.fitted.losses, &self.bench.data);
+        let best = possible(&both).filter(says_all)?.clone();
         self.levels.truncate(1);
         self.levels.push(both);
         self.chosen(best).filter(|chosen| chosen.best.hypothesis.parts.len() == 2)
