@@ -5,7 +5,7 @@
 
 use super::Fitting;
 use super::fits::{Bench, Changes, Fitted};
-use super::hypothesis::{Hypothesis, Off, neutralised};
+use super::hypothesis::{Hypothesis, Off, Part};
 use super::residuals::{self, Data, Loss, Scope};
 use super::selection::evidence::{explained, gain, odds};
 use super::selection::{LEAST_EVIDENCE, MAY_COME_FURTHER, MOST_EFFECTS, OUT_OF_REACH};
@@ -184,39 +184,37 @@ impl Compared<'_> {
         more.or_else(|| self.needs_less(found, now, &own, &others))
     }
 
-    /// Which of some other ways explains the data far better with the causes that were found in one.
+    /// Which of some other ways explains the data far better with the causes that were found in one, and a good part of what they leave there.
     fn explains_more(&self, found: &Found, now: usize, own: &[Loss], others: &[usize]) -> Option<usize> {
         let again = others.iter().filter_map(|other| {
             let again = self.exact_fit_again(&found.chosen.best, *other, found.bench().off)?;
             Some((*other, self.losses(now, *other, &again)?))
         });
         let is_worth_it = |other: &[Loss]| explained(own, other, &self.data[now]) >= MAY_COME_FURTHER;
-        let is_needed = |other: &[Loss]| is_worth_it(other) && is_far_better(&[own.to_vec()], other);
-        best(again.filter(|(_, other)| is_needed(other))).map(|(best, _)| best)
+        best(again.filter(|(_, other)| is_worth_it(other) && is_far_better(own, other))).map(|(best, _)| best)
     }
 
     /// Which of some other ways is no less likely with one of the causes less than were found in one.
     fn needs_less(&self, found: &Found, now: usize, own: &[Loss], others: &[usize]) -> Option<usize> {
         let all = &found.chosen.best;
-        let fewer = all.hypothesis.parts.iter().map(|part| Fitted {
-            hypothesis: all.hypothesis.without(part.effect.name),
-            parameters: neutralised(&all.parameters, part.effect),
-            ..all.clone()
-        });
-        let each = fewer.flat_map(|fewer| others.iter().map(move |other| (*other, fewer.clone())));
-        let as_likely = each.filter_map(|(other, fewer)| {
-            let more = all.hypothesis.size() as f64 - fewer.hypothesis.size() as f64;
-            let odds_against = |losses: &[Loss]| odds(losses, own, more);
-            let bench = self.taken[other].bench(found.bench().off).ok()?;
-            let rough = bench.rough_fit_again(&fewer)?;
-            // The end of a fit that is far away changes nothing.
-            let samples: f64 = own.iter().map(|loss| loss.effective).sum();
-            if odds_against(&self.losses(now, other, &rough)?) > 0.5 * samples * OUT_OF_REACH.ln() {
-                return None;
-            }
-            let again = bench.exact_fit(&fewer.hypothesis, &rough.parameters, Scope::All)?;
-            let losses = self.losses(now, other, &again)?;
-            (odds_against(&losses) <= 0.0).then_some((other, losses))
+        let without = |part: &Part| found.bench().neutralised(all, part.effect);
+        let fewer: Vec<Fitted> = all.hypothesis.parts.iter().filter_map(without).collect();
+        let as_likely = others.iter().filter_map(|other| {
+            let bench = self.taken[*other].bench(found.bench().off).ok()?;
+            let each = fewer.iter().filter_map(|fewer| {
+                let more = all.hypothesis.size() as f64 - fewer.hypothesis.size() as f64;
+                let odds_against = |losses: &[Loss]| odds(losses, own, more);
+                let rough = bench.rough_fit_again(fewer)?;
+                // The end of a fit that is far away changes nothing.
+                let samples: f64 = own.iter().map(|loss| loss.effective).sum();
+                if odds_against(&self.losses(now, *other, &rough)?) > 0.5 * samples * OUT_OF_REACH.ln() {
+                    return None;
+                }
+                let again = bench.exact_fit(&fewer.hypothesis, &rough.parameters, Scope::All)?;
+                let losses = self.losses(now, *other, &again)?;
+                (odds_against(&losses) <= 0.0).then_some((*other, losses))
+            });
+            best(each)
         });
         best(as_likely).map(|(best, _)| best)
     }
@@ -233,7 +231,7 @@ impl Compared<'_> {
             let again = bench.rough_fit_again(fitted)?;
             Some((way, self.losses(0, way, &again)?, again))
         });
-        let better: Vec<_> = rough.filter(|(_, losses, _)| is_far_better(own, losses)).collect();
+        let better: Vec<_> = rough.filter(|(_, losses, _)| own.iter().all(|own| is_far_better(own, losses))).collect();
         let are_of_one_way = better.iter().all(|(way, ..)| *way == better[0].0);
         let precise = better.iter().filter(|_| !are_of_one_way).filter_map(|(way, _, rough)| {
             let most = Off::most(self.taken[*way].nominal);
@@ -255,9 +253,9 @@ impl Compared<'_> {
     }
 }
 
-/// Whether a fit in another way explains the data far better than all own ones.
-fn is_far_better(own: &[Vec<Loss>], other: &[Loss]) -> bool {
-    own.iter().all(|own| gain(own, other) > LEAST_EVIDENCE)
+/// Whether a fit in another way explains the data far better than an own one.
+fn is_far_better(own: &[Loss], other: &[Loss]) -> bool {
+    gain(own, other) > LEAST_EVIDENCE
 }
 
 /// The one of several fits in other ways that explains most.

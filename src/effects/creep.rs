@@ -95,13 +95,8 @@ fn is_taken_back([first, second]: [f64; 2]) -> bool {
     first * second < 0.0 && first.abs().min(second.abs()) > TAKEN_BACK * first.abs().max(second.abs())
 }
 
-/// Ratio of the times of neighbours in the spectrum.
-fn spacing() -> f64 {
-    (SLOWEST / FASTEST).powf(1.0 / (ELEMENTS - 1) as f64)
-}
-
 /// Values of the elements of the spectrum, each so many times the one before.
-fn each_of_spectrum(first: f64, ratio: f64) -> [f64; ELEMENTS] {
+fn geometric(first: f64, ratio: f64) -> [f64; ELEMENTS] {
     let mut value = first / ratio;
     [(); ELEMENTS].map(|()| {
         value *= ratio;
@@ -129,18 +124,18 @@ impl Creep {
         if goes_back { self.return_ratio * time } else { time }
     }
 
-    /// Shares of the elements of the spectrum in its amplitude.
-    fn shares(&self) -> [f64; ELEMENTS] {
-        let ratio = spacing().powf(self.spectrum_exponent);
-        let relative = each_of_spectrum(1.0, ratio);
+    /// Share in the amplitude and time in s of each element of the spectrum.
+    fn spectrum(&self) -> [(f64, f64); ELEMENTS] {
+        let spacing = (SLOWEST / FASTEST).powf(1.0 / (ELEMENTS - 1) as f64);
+        let relative = geometric(1.0, spacing.powf(self.spectrum_exponent));
         let sum: f64 = relative.iter().sum();
-        relative.map(|share| share / sum)
+        let times = geometric(FASTEST, spacing);
+        std::array::from_fn(|k| (relative[k] / sum, times[k]))
     }
 
     /// Share of its amplitude by which the spectrum has given way at a time in s after a step.
     fn given_way(&self, time: f64) -> f64 {
-        let each = self.shares().into_iter().zip(each_of_spectrum(FASTEST, spacing()));
-        each.map(|(share, own)| share * -(-time / own).exp_m1()).sum()
+        self.spectrum().into_iter().map(|(share, own)| share * -(-time / own).exp_m1()).sum()
     }
 
     /// Stretch in m that flows off within a time constant, from a stretch in m.
@@ -229,8 +224,7 @@ impl Effect for Creep {
         own[2..4].copy_from_slice(&[self.relaxed_share * contraction, at.pressure_pull]);
         own[7] = self.relaxed_share * pressure;
         let aim = self.spectrum_amplitude * (1.0 - self.relaxed_share) * contraction;
-        let each = own[SPECTRUM..].iter_mut().zip(self.shares()).zip(each_of_spectrum(FASTEST, spacing()));
-        for ((drift, share), time) in each {
+        for (drift, (share, time)) in own[SPECTRUM..].iter_mut().zip(self.spectrum()) {
             *drift = share * aim * (1.0 - (1.0 - self.settled_share).powf(SETTLING / time));
         }
     }
@@ -246,7 +240,7 @@ impl Effect for Creep {
         }
         if self.spectrum_amplitude != 0.0 {
             let aim = self.spectrum_amplitude * (at.contraction - own[2]);
-            for (k, (share, time)) in self.shares().into_iter().zip(each_of_spectrum(FASTEST, spacing())).enumerate() {
+            for (k, (share, time)) in self.spectrum().into_iter().enumerate() {
                 rates[SPECTRUM + k] = self.rate(own[SPECTRUM + k], share * aim, time);
             }
         }
@@ -339,7 +333,7 @@ mod tests {
                 let expected = share(&|time: f64| time.powf(power), time);
                 assert!((given - expected).abs() < 0.02, "{power}: {given} for {expected} at {time} s");
             }
-            assert!((creep.shares().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            assert!((creep.spectrum().iter().map(|(share, _)| share).sum::<f64>() - 1.0).abs() < 1e-12);
         }
     }
 }
