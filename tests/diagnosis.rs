@@ -58,19 +58,18 @@ fn stairs_and_ramps(time: f64) -> f64 {
 
 /// A sound muscle at 50 samples a second with noise, from a gauge pressure in bar on, whose command goes so between its samples.
 fn sound_muscle(between: Between, start: f64) -> Recording {
-    muscle(&Parameters::default(), between, start)
+    muscle(&Parameters::default(), stairs_and_ramps, between, start)
 }
 
-/// The same of another muscle.
-fn muscle(truth: &Parameters, between: Between, start: f64) -> Recording {
-    Recording::parse(muscle_as_text(truth, between, start).as_bytes(), Path::new("muscle.csv"), &[]).unwrap()
+/// The same of another muscle and with another command.
+fn muscle(truth: &Parameters, command: fn(f64) -> f64, between: Between, start: f64) -> Recording {
+    Recording::parse(muscle_as_text(truth, command, between, start).as_bytes(), Path::new("muscle.csv"), &[]).unwrap()
 }
 
 /// The same as a CSV file.
-fn muscle_as_text(truth: &Parameters, between: Between, start: f64) -> String {
+fn muscle_as_text(truth: &Parameters, command: fn(f64) -> f64, between: Between, start: f64) -> String {
     let text = |shown: &dyn Fn(usize) -> String| {
-        let row =
-            |k: usize| format!("{:.2},{:.5},{},40\n", 0.02 * k as f64, stairs_and_ramps(0.02 * k as f64), shown(k));
+        let row = |k: usize| format!("{:.2},{:.5},{},40\n", 0.02 * k as f64, command(0.02 * k as f64), shown(k));
         let header = "time [s],command [V],gauge_pressure [bar],contraction [mm],load_mass [kg]\n".to_owned();
         (0..1300).fold(header, |text, k| text + &row(k))
     };
@@ -96,10 +95,16 @@ fn a_command_that_changes_at_its_samples_is_no_cause() {
 
 #[test]
 fn a_held_command_is_no_late_valve_beside_a_cause() {
+    // Waves that are held come half a sampling interval late, which a dead time explains as well; but then there are two causes.
+    let waves =
+        |time: f64| 2.0 + 0.25 * (1.1 * time).sin() + 0.15 * (2.9 * time + 1.0).sin() + 0.06 * (5.3 * time).sin();
     let mut truth = Parameters::default();
-    (truth.effects.contraction_sensor_offset.offset, truth.effects.contraction_sensor_offset.settling) = (6e-3, 2e-3);
-    let found = diagnosis_of(&[muscle(&truth, Between::Held, stairs_and_ramps(0.0))]);
-    assert_eq!((causes(&found), found.between), (vec!["contraction_sensor_offset"], Between::Held));
+    truth.effects.payload_mass.additional_mass = 4.0;
+    let found = diagnosis_of(&[muscle(&truth, waves, Between::Held, waves(0.0))]);
+    assert_eq!((found.causes.len(), found.between), (1, Between::Held), "{:?}", causes(&found));
+    // A cable that stretches under the one load there is shifts the contraction, too.
+    let cause = &found.causes[0];
+    assert!(cause.effect == "payload_mass" || cause.alternatives.contains(&"payload_mass"), "{cause:?}");
 }
 
 #[test]
@@ -107,7 +112,7 @@ fn a_second_cause_is_found_that_shapes_of_the_first_one_could_stand_for() {
     let mut truth = Parameters::default();
     (truth.effects.creep.spectrum_amplitude, truth.effects.creep.spectrum_exponent) = (0.2, 0.3);
     truth.effects.end_effects.excess = 0.13;
-    let found = diagnosis_of(&[muscle(&truth, Between::Lines, stairs_and_ramps(0.0))]);
+    let found = diagnosis_of(&[muscle(&truth, stairs_and_ramps, Between::Lines, stairs_and_ramps(0.0))]);
     assert_eq!(causes(&found), ["creep", "end_effects"]);
 }
 
@@ -123,7 +128,7 @@ fn a_recording_that_begins_while_the_pressure_still_rises_is_no_cause() {
 #[test]
 fn a_recording_that_is_cut_out_of_a_longer_one_is_no_cause() {
     // From where the load swings on; every fiftieth of a second a reading.
-    let whole = muscle_as_text(&Parameters::default(), Between::Lines, stairs_and_ramps(0.0));
+    let whole = muscle_as_text(&Parameters::default(), stairs_and_ramps, Between::Lines, stairs_and_ramps(0.0));
     let mut rows = whole.lines();
     let header = rows.next().unwrap();
     let cut: String = rows.skip(155).map(|row| format!("{row}\n")).collect();
