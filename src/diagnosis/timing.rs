@@ -105,6 +105,17 @@ impl<'r> Taken<'r> {
         }
         first.searched(MOST_EFFECTS, fitting).ok_or_else(|| residuals::cannot_follow(&self.recordings))
     }
+
+    /// The same after something was found in another way. Two causes that were found where the coefficients may be off most, and are two here,
+    /// too, are what there is: to look for all others again takes minutes.
+    fn searched_again<'a>(&'a self, found: &Found<'a>, fitting: &'a Fitting<'a>) -> Result<Found<'a>> {
+        let again = if found.names_two_in_wide_way() {
+            self.wide_way()?.searched_from_two(&found.chosen.best, fitting)
+        } else {
+            None
+        };
+        again.map_or_else(|| self.searched(fitting), Ok)
+    }
 }
 
 /// Whether there are two ways in which the coefficients of a nominal model may be off.
@@ -138,7 +149,7 @@ pub fn better<'a>(taken: &'a [Taken<'a>], fitting: &'a Fitting<'a>) -> Result<(F
         }
     };
     let (way, found) = match compared.needed_in_the_end(&found, way) {
-        Some(other) => anew(other)?,
+        Some(other) => (other, taken[other].searched_again(&found, fitting)?),
         None => (way, found),
     };
     Ok((found, compared.data.swap_remove(way)))

@@ -50,6 +50,14 @@ impl<'a> Way<'a> {
         Found::of(self.looked_over(fitting), most).map(|found| found.or_two(None))
     }
 
+    /// Two effects that were found elsewhere, or what is as good as they are, with what there is to find beside; `None` where that does not come to
+    /// two, or a model cannot be simulated.
+    pub fn searched_from_two(self, found: &Fitted, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
+        let mut search = self.looked_over(fitting);
+        search.take_two(found)?;
+        Found::of(search, MOST_EFFECTS).filter(|found| found.best().causes() > 1)
+    }
+
     fn looked_over(self, fitting: &'a Fitting<'a>) -> Search<'a> {
         Search::new(self.bench, self.baseline, self.allows_most, fitting)
     }
@@ -154,6 +162,11 @@ impl<'a> Found<'a> {
     /// The hypotheses' fits.
     pub fn bench(&self) -> &Bench<'a> {
         &self.search.bench
+    }
+
+    /// Whether it names two causes where the coefficients may be off in the way that allows most.
+    pub fn names_two_in_wide_way(&self) -> bool {
+        self.search.allows_most() && self.chosen.names_causes() && self.chosen.best.hypothesis.parts.len() == 2
     }
 
     /// Whether one cause or none leaves no more than a sound model may.

@@ -32,8 +32,9 @@ impl Search<'_> {
         let best = known.unwrap_or_else(|| self.in_best_form(best, None));
         let may_be_form = self.may_be_form(&best.fitted.losses);
         let explains = best.explained > LEAST_EXPLAINED.0;
-        let is_close = |(rank, _): &(usize, Judged)| {
-            rivals.contains(rank) || !may_be_form && ranks.contains(rank) || leads == Some(*rank)
+        let is_close = |(rank, judged): &(usize, Judged)| {
+            let may_be = rivals.contains(rank) || !may_be_form && ranks.contains(rank) || leads == Some(*rank);
+            may_be && !self.is_out_of_reach(Some(&best), judged)
         };
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
@@ -75,8 +76,8 @@ impl Search<'_> {
         instead.find(|fit| evidence(fit, &impossible.fitted) < LEAST_EVIDENCE).map(|fit| self.judge(fit))
     }
 
-    /// Whether a hypothesis explains so much less than a best one that says all that the end of its fit changes nothing.
-    fn is_out_of_reach(&self, best: Option<&Judged>, other: &Judged) -> bool {
+    /// Whether a hypothesis explains so much less than a best one that says all that neither the end of its fit nor another form changes anything.
+    pub(super) fn is_out_of_reach(&self, best: Option<&Judged>, other: &Judged) -> bool {
         let says_all = |best: &&Judged| is_possible(best) && !is_unsound(&best.fitted.losses, &self.bench.data);
         best.filter(says_all).is_some_and(|best| {
             let before = beyond_noise(&self.baseline.losses);
@@ -208,7 +209,11 @@ impl Search<'_> {
     pub(super) fn rivals_in_best_form(&self, level: Vec<Judged>) -> Vec<Judged> {
         let best = possible(&level).filter(|best| self.may_be_form(&best.fitted.losses));
         let Some(best) = best.cloned() else { return level };
-        let lacks_form = |judged: &Judged| judged.explained > LEAST_EXPLAINED_EXACTLY.0 && !same_effects(judged, &best);
+        let lacks_form = |judged: &Judged| {
+            judged.explained > LEAST_EXPLAINED_EXACTLY.0
+                && !same_effects(judged, &best)
+                && !self.is_out_of_reach(Some(&best), judged)
+        };
         let (mut close, mut rest): (Vec<_>, Vec<_>) = level.into_iter().partition(lacks_form);
         close.sort_by_key(|judged| !differ_in_one(judged, &best)); // only these can stand in the place of one of its effects
         rest.extend(close.split_off(close.len().min(MAY_BE_RIVALS)));

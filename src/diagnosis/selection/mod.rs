@@ -219,15 +219,32 @@ impl<'a> Search<'a> {
         self.refine();
         while self.goes_on(most) {
             let next = self.next_level(self.levels.last()?);
-            self.levels.push(next);
-            // What is not told has no rivals.
-            if self.leading().is_some_and(|best| best.fitted.hypothesis.parts.len() == self.levels.len()) {
-                let next = self.levels.pop()?;
-                let next = self.rivals_in_best_form(next);
-                self.levels.push(next);
-            }
+            self.goes_to(next);
         }
         self.choose()
+    }
+
+    /// Takes two effects that were found elsewhere, and what is as good as they are here, for all that there is to find of one or two.
+    pub fn take_two(&mut self, found: &Fitted) -> Option<()> {
+        self.complete();
+        self.is_refined = true;
+        let both = self.judge(self.bench.exact_fit(&found.hypothesis, &found.parameters, Scope::All)?);
+        let both = self.in_best_form(both, None);
+        let next = self.with_exchanged(&self.levels[0], vec![both]);
+        self.goes_to(next);
+        Some(())
+    }
+
+    /// Goes on to hypotheses with one effect more, those that may rival the one that leads in their best form.
+    fn goes_to(&mut self, next: Vec<Judged>) {
+        self.levels.push(next);
+        // What is not told has no rivals.
+        if self.leading().is_some_and(|best| best.fitted.hypothesis.parts.len() == self.levels.len())
+            && let Some(next) = self.levels.pop()
+        {
+            let next = self.rivals_in_best_form(next);
+            self.levels.push(next);
+        }
     }
 
     /// Whether at most so many effects at once are more than were looked for, and worth it.
@@ -343,8 +360,7 @@ impl<'a> Search<'a> {
         if worth > 0.0 { 1.0 - still / worth } else { 0.0 }
     }
 
-    /// The most promising hypotheses with one effect more than those of a level, the best first. Of the best, and of the best that can be, effects
-    /// are exchanged for others until no other one becomes the best by that.
+    /// The most promising hypotheses with one effect more than those of a level, the best first.
     fn next_level(&self, level: &[Judged]) -> Vec<Judged> {
         let bases = carried_on(level);
         // What forms may leave is looked into where the best leaves it first.
@@ -361,6 +377,12 @@ impl<'a> Search<'a> {
             next.extend(self.extended(level, &others));
             next = each_once(next);
         }
+        self.with_exchanged(level, next)
+    }
+
+    /// Hypotheses with one effect more than those of a level, and those with effects of the best, and of the best that can be, exchanged for others
+    /// until no other one becomes the best by that; the best first.
+    fn with_exchanged(&self, level: &[Judged], mut next: Vec<Judged>) -> Vec<Judged> {
         let mut exchanged_in: Vec<Vec<&str>> = Vec::new();
         loop {
             // Of what would be better but cannot be, one effect alone may be wrong.
@@ -405,7 +427,9 @@ impl<'a> Search<'a> {
             self.extend(base, leads, &others.collect::<Vec<_>>())
         };
         let mut exchanged: Vec<Judged> = bases.iter().flat_map(exchange).collect();
-        exchanged.retain(|other| !known.iter().any(|known| same_effects(known, other) && known.score >= other.score));
+        let is_known =
+            |other: &Judged| known.iter().any(|known| same_effects(known, other) && known.score >= other.score);
+        exchanged.retain(|other| !is_known(other) && !self.is_out_of_reach(Some(best), other));
         self.worth_refining(level, exchanged)
     }
 

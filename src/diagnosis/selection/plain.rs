@@ -3,8 +3,7 @@
 use super::evidence::is_unsound;
 use super::{Chosen, Judged, MAY_GO_FURTHER, Search, first_of_each, possible, sorted};
 use crate::diagnosis::fits::Fitted;
-use crate::diagnosis::hypothesis::{Hypothesis, Part};
-use crate::diagnosis::residuals::Scope;
+use crate::diagnosis::hypothesis::Part;
 use rayon::prelude::*;
 
 impl Search<'_> {
@@ -13,7 +12,7 @@ impl Search<'_> {
     /// second cause so.
     pub fn as_two(&mut self, single: &Fitted) -> Option<Chosen> {
         let [part] = single.hypothesis.parts[..] else { return None };
-        let plain = self.in_plain_form(single, part)?;
+        let plain = self.in_plain_form(single)?;
         if !is_unsound(&plain.fitted.losses, &self.bench.data) {
             return None;
         }
@@ -33,9 +32,8 @@ impl Search<'_> {
     }
 
     /// The cause of a fit, be it one to the same data in another way, in the form that does best without refinements.
-    fn in_plain_form(&self, single: &Fitted, part: Part) -> Option<Judged> {
-        let own = Hypothesis { parts: vec![Part::plain(part.effect, part.form)], beside: None };
-        let own = self.judge(self.bench.exact_fit(&own, &single.parameters, Scope::All)?);
+    fn in_plain_form(&self, single: &Fitted) -> Option<Judged> {
+        let own = self.judge(self.bench.less_refined(single, |_| false)?);
         let other = self.in_other_forms(&own, |_| true).map(|other| self.finished(other));
         other.into_iter().chain([own]).max_by(|a, b| a.score.total_cmp(&b.score))
     }
