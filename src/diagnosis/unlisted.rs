@@ -7,8 +7,8 @@ use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::simulation::{Replay, slopes};
 
-/// Speeds in m/s above which a measuring wheel may slip.
-const SLIPPING: [f64; 7] = [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.07];
+/// Speeds in m/s above which a measuring wheel may slip, the last one and their spacing; and the finer spacing around the best.
+const SLIPPING: (f64, f64, f64) = (0.1, 0.01, 0.001);
 /// Frequencies in Hz at which a post may rock, the first and the last, and the step between them, as a ratio.
 const ROCKING: (f64, f64, f64) = (1.5, 12.0, 1.08);
 /// Steps to either side of the best of them, fine enough for a post that rocks on for some time.
@@ -50,17 +50,17 @@ impl Unlisted {
     pub fn all() -> Vec<Self> {
         let slips = [-1.0, 0.0, 1.0].into_iter().flat_map(|direction| {
             // All of the way in both directions is a gain.
-            let speeds = SLIPPING.into_iter().filter(move |speed| direction != 0.0 || *speed > 0.0);
+            let (last, spacing, _) = SLIPPING;
+            let speeds = multiples(spacing, last).filter(move |speed| direction != 0.0 || *speed > 0.0);
             speeds.map(move |speed| Self::Slip { direction, speed })
         });
         let talks = [Signal::Force, Signal::Contraction].map(Self::CrossTalk);
         let rocking = steps(ROCKING).map(|frequency| Self::Rocking { frequency, damping: DAMPING });
         let fading = steps(FADING).map(|time| Self::Fading { time });
         let (last, spacing, _) = AT_EASE;
-        let hoses = [Signal::Force, Signal::Contraction].into_iter().flat_map(|signal| {
-            let pressures = (0..).map(move |k| f64::from(k) * spacing).take_while(move |pressure| *pressure <= last);
-            pressures.map(move |at_ease| Self::Hose { signal, at_ease })
-        });
+        let hoses = [Signal::Force, Signal::Contraction]
+            .into_iter()
+            .flat_map(|signal| multiples(spacing, last).map(move |at_ease| Self::Hose { signal, at_ease }));
         let plays = [false, true]
             .into_iter()
             .flat_map(|with_pull| steps(PLAY).map(move |half_width| Self::Play { half_width, start: 0.0, with_pull }));
@@ -76,17 +76,19 @@ impl Unlisted {
                 all.collect()
             }
             Self::Fading { time } => around(time, FADING.2).map(|time| Self::Fading { time }).collect(),
+            Self::Slip { direction, speed } => {
+                let speeds = between(speed, SLIPPING).filter(|speed| *speed > 0.0 || direction != 0.0 && *speed == 0.0);
+                speeds.map(|speed| Self::Slip { direction, speed }).collect()
+            }
             Self::Hose { signal, at_ease } => {
-                let (_, spacing, fine) = AT_EASE;
-                let steps = (spacing / fine) as i32;
-                (-steps..=steps).map(|k| Self::Hose { signal, at_ease: at_ease + f64::from(k) * fine }).collect()
+                between(at_ease, AT_EASE).map(|at_ease| Self::Hose { signal, at_ease }).collect()
             }
             Self::Play { half_width, with_pull, .. } => {
                 let all = around(half_width, PLAY.2)
                     .flat_map(|half_width| HANGING.map(|start| Self::Play { half_width, start, with_pull }));
                 all.collect()
             }
-            _ => vec![self],
+            Self::CrossTalk(_) => vec![self],
         }
     }
 
@@ -197,6 +199,17 @@ impl<'d> Shown<'d> {
 /// Values from a first one to a last one, by a ratio.
 fn steps((first, last, ratio): (f64, f64, f64)) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(first), move |value| Some(value * ratio)).take_while(move |value| *value <= last)
+}
+
+/// Multiples of a spacing from zero to a last one.
+fn multiples(spacing: f64, last: f64) -> impl Iterator<Item = f64> {
+    (0..).map(move |k| f64::from(k) * spacing).take_while(move |value| *value <= last)
+}
+
+/// Values around one of such multiples, up to the next ones, in the finer spacing.
+fn between(value: f64, (_, spacing, fine): (f64, f64, f64)) -> impl Iterator<Item = f64> {
+    let steps = (spacing / fine).round() as i32;
+    (-steps..=steps).map(move |k| value + f64::from(k) * fine)
 }
 
 /// Values around one of such steps, up to the next ones.

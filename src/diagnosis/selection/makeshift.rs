@@ -1,17 +1,28 @@
 //! Causes that are in no library: where one of them explains the data far better than effects of the library do, these are makeshifts.
 
 use super::evidence::{evidence, is_unsound};
-use super::{Judged, LEAST_EVIDENCE, Search};
+use super::{Judged, LEAST_EVIDENCE, MAY_GO_FURTHER, Search};
 use crate::diagnosis::residuals::Scope;
 use crate::diagnosis::selection::naming::LEAST_EXPLAINED;
 use crate::diagnosis::unlisted::{Shown, Unlisted};
 use rayon::prelude::*;
 
+/// How often at most a cause is looked at again beside the model that it leaves.
+const MOST_ROUNDS: usize = 4;
+
+/// A cause in no library beside the nominal model.
+struct Beside {
+    cause: Unlisted,
+    /// What one of size one adds to the residuals.
+    course: Vec<f64>,
+    fit: Judged,
+}
+
 impl Search<'_> {
     /// The best of them that is worth a word: it shows, and has the odds and the share of the error, seen and unseen, that an effect needs
     /// to be named.
     pub(super) fn best_unlisted(&self) -> Option<Judged> {
-        if self.is_sound(&self.baseline.losses) {
+        if !self.may_show() {
             return None;
         }
         let shown = Shown::beside(&self.bench.data, &self.baseline.parameters)?;
@@ -22,19 +33,42 @@ impl Search<'_> {
             }
         }
         let fits = each.into_iter().filter_map(|cause| {
-            let best = self.most_promising(&shown, cause.nearby()).into_iter().next()?;
-            let course = shown.by(best)?;
-            let fit = self.judge(self.bench.fit_beside(&self.baseline, best, &course, Scope::All)?);
+            let Beside { cause, course, fit } = self.settled(cause, &shown)?;
             let explains = fit.evidence > LEAST_EVIDENCE
                 && fit.explained > LEAST_EXPLAINED.0
                 && self.shows(&self.baseline.losses, &fit.fitted.losses);
             let foretells = || {
-                let trained = self.bench.fit_beside(&self.baseline, best, &course, Scope::Training)?;
+                let trained = self.bench.fit_beside(&self.baseline, cause, &course, Scope::Training)?;
                 self.holds(&trained, Scope::Training)
             };
             (explains && foretells() == Some(true)).then_some(fit)
         });
         fits.max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+
+    /// A cause in the form that does best. The baseline stands for a part of what it does, and moves otherwise than the muscle did: as far as the cause
+    /// explains a good part, it is looked at again beside the model that is left.
+    fn settled(&self, cause: Unlisted, shown: &Shown) -> Option<Beside> {
+        let mut best = self.beside_nearby(cause, shown)?;
+        for _ in 0..MOST_ROUNDS {
+            if best.fit.explained < MAY_GO_FURTHER {
+                break;
+            }
+            let shown = Shown::beside(&self.bench.data, &best.fit.fitted.parameters)?;
+            match self.beside_nearby(best.cause, &shown) {
+                Some(next) if next.fit.score > best.fit.score => best = next,
+                _ => break,
+            }
+        }
+        Some(best)
+    }
+
+    /// The most promising form near one, fitted.
+    fn beside_nearby(&self, cause: Unlisted, shown: &Shown) -> Option<Beside> {
+        let cause = self.most_promising(shown, cause.nearby()).into_iter().next()?;
+        let course = shown.by(cause)?;
+        let fit = self.judge(self.bench.fit_beside(&self.baseline, cause, &course, Scope::All)?);
+        Some(Beside { cause, course, fit })
     }
 
     /// Causes that may take something off the error, the most promising first.

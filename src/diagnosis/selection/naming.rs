@@ -58,7 +58,11 @@ impl Search<'_> {
     /// What there is where nothing can be named, be it that what leads is refused: a cause in no library, if there is one that does better.
     fn unnamed(&self, refused: Option<&Judged>) -> Option<Chosen> {
         let Fitted { hypothesis, parameters, losses, .. } = &self.baseline;
-        let unlisted = refused.map_or(self.unlisted.as_ref(), |refused| self.unlisted_instead_of(refused));
+        // What is small enough to be none is a cause in no library only where one in the library would have had a name.
+        let unlisted = match refused {
+            Some(refused) => self.unlisted_instead_of(refused),
+            None => self.unlisted.as_ref().filter(|_| !self.is_sound(losses)),
+        };
         let is_nominal = unlisted.is_none() && self.is_sound(losses);
         Some(Chosen {
             verdict: if is_nominal { Verdict::Nominal } else { Verdict::Unexplained },
