@@ -48,12 +48,8 @@ pub enum Unlisted {
 impl Unlisted {
     /// One of each, in different forms.
     pub fn all() -> Vec<Self> {
-        let slips = [-1.0, 0.0, 1.0].into_iter().flat_map(|direction| {
-            // All of the way in both directions is a gain.
-            let (last, spacing, _) = SLIPPING;
-            let speeds = multiples(spacing, last).filter(move |speed| direction != 0.0 || *speed > 0.0);
-            speeds.map(move |speed| Self::Slip { direction, speed })
-        });
+        let (last, spacing, _) = SLIPPING;
+        let slips = [-1.0, 0.0, 1.0].into_iter().flat_map(|direction| Self::slips(direction, multiples(spacing, last)));
         let talks = [Signal::Force, Signal::Contraction].map(Self::CrossTalk);
         let rocking = steps(ROCKING).map(|frequency| Self::Rocking { frequency, damping: DAMPING });
         let fading = steps(FADING).map(|time| Self::Fading { time });
@@ -67,6 +63,12 @@ impl Unlisted {
         slips.chain(talks).chain(rocking).chain(fading).chain(hoses).chain(plays).collect()
     }
 
+    /// Wheels that slip above one of several speeds, as far as they can: all of the way in both directions is a gain.
+    fn slips(direction: f64, speeds: impl Iterator<Item = f64>) -> impl Iterator<Item = Self> {
+        let can_be = move |speed: &f64| *speed > 0.0 || direction != 0.0 && *speed == 0.0;
+        speeds.filter(can_be).map(move |speed| Self::Slip { direction, speed })
+    }
+
     /// Forms between those of [`Self::all`].
     pub fn nearby(self) -> Vec<Self> {
         match self {
@@ -76,10 +78,7 @@ impl Unlisted {
                 all.collect()
             }
             Self::Fading { time } => around(time, FADING.2).map(|time| Self::Fading { time }).collect(),
-            Self::Slip { direction, speed } => {
-                let speeds = between(speed, SLIPPING).filter(|speed| *speed > 0.0 || direction != 0.0 && *speed == 0.0);
-                speeds.map(|speed| Self::Slip { direction, speed }).collect()
-            }
+            Self::Slip { direction, speed } => Self::slips(direction, between(speed, SLIPPING)).collect(),
             Self::Hose { signal, at_ease } => {
                 between(at_ease, AT_EASE).map(|at_ease| Self::Hose { signal, at_ease }).collect()
             }

@@ -209,12 +209,12 @@ impl Search<'_> {
     pub(super) fn rivals_in_best_form(&self, level: Vec<Judged>) -> Vec<Judged> {
         let best = possible(&level).filter(|best| self.may_be_form(&best.fitted.losses));
         let Some(best) = best.cloned() else { return level };
-        let lacks_form = |judged: &Judged| {
+        let is_close = |judged: &Judged| {
             judged.explained > LEAST_EXPLAINED_EXACTLY.0
                 && !same_effects(judged, &best)
                 && !self.is_out_of_reach(Some(&best), judged)
         };
-        let (mut close, mut rest): (Vec<_>, Vec<_>) = level.into_iter().partition(lacks_form);
+        let (mut close, mut rest): (Vec<_>, Vec<_>) = level.into_iter().partition(is_close);
         close.sort_by_key(|judged| !differ_in_one(judged, &best)); // only these can stand in the place of one of its effects
         rest.extend(close.split_off(close.len().min(MAY_BE_RIVALS)));
         let close = close.into_par_iter().map(|judged| self.in_best_form(judged, Some(&best)));

@@ -82,18 +82,17 @@ impl Search<'_> {
         promising.into_iter().map(|(cause, _)| cause).collect()
     }
 
-    /// The cause in no library that has the odds against a hypothesis, if there is one.
-    pub(super) fn unlisted_instead_of(&self, best: &Judged) -> Option<&Judged> {
-        self.unlisted.as_ref().filter(|unlisted| evidence(&best.fitted, &unlisted.fitted) > LEAST_EVIDENCE)
+    /// The cause in no library that has the odds against a hypothesis, or beside none where the error is large enough to be one.
+    pub(super) fn unlisted_instead_of(&self, best: Option<&Judged>) -> Option<&Judged> {
+        self.unlisted.as_ref().filter(|unlisted| match best {
+            Some(best) => evidence(&best.fitted, &unlisted.fitted) > LEAST_EVIDENCE,
+            None => !self.is_sound(&self.baseline.losses),
+        })
     }
 
     /// Whether such a cause leaves no more than a sound model may, where nothing does that has fewer causes than are looked for next.
     pub(super) fn unlisted_says_all(&self) -> bool {
         let says_all = |unlisted: &Judged| !is_unsound(&unlisted.fitted.losses, &self.bench.data);
-        let instead = match self.leading() {
-            Some(best) => self.unlisted_instead_of(best),
-            None => self.unlisted.as_ref(),
-        };
-        instead.is_some_and(says_all)
+        self.unlisted_instead_of(self.leading()).is_some_and(says_all)
     }
 }

@@ -179,7 +179,8 @@ impl<'a> Search<'a> {
             self.best_single = Some(best.clone());
             singles = sorted(singles);
         }
-        let leading = possible(&singles).filter(|best| self.leads(best) && self.unlisted_instead_of(best).is_none());
+        let leading =
+            possible(&singles).filter(|best| self.leads(best) && self.unlisted_instead_of(Some(best)).is_none());
         leading.map(|leading| leading.fitted.clone())
     }
 

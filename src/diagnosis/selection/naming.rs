@@ -58,11 +58,7 @@ impl Search<'_> {
     /// What there is where nothing can be named, be it that what leads is refused: a cause in no library, if there is one that does better.
     fn unnamed(&self, refused: Option<&Judged>) -> Option<Chosen> {
         let Fitted { hypothesis, parameters, losses, .. } = &self.baseline;
-        // What is small enough to be none is a cause in no library only where one in the library would have had a name.
-        let unlisted = match refused {
-            Some(refused) => self.unlisted_instead_of(refused),
-            None => self.unlisted.as_ref().filter(|_| !self.is_sound(losses)),
-        };
+        let unlisted = self.unlisted_instead_of(refused);
         let is_nominal = unlisted.is_none() && self.is_sound(losses);
         Some(Chosen {
             verdict: if is_nominal { Verdict::Nominal } else { Verdict::Unexplained },
@@ -111,7 +107,7 @@ impl Search<'_> {
         let size = plain.fitted.hypothesis.size();
         let told = self.without_idle(plain.clone());
         // As it is told, without refinements that only comparisons paid for, it must lose, too.
-        if [best, &told].into_iter().all(|judged| self.unlisted_instead_of(judged).is_some()) {
+        if [best, &told].into_iter().all(|judged| self.unlisted_instead_of(Some(judged)).is_some()) {
             return None;
         }
         let are_idle = told.fitted.hypothesis.size() < size;
