@@ -191,21 +191,25 @@ fn a_shifted_position_sensor_is_found_in_hanging_and_prescribed_motion() {
 
 #[test]
 fn a_cause_in_no_library_that_is_known_by_its_course_gets_no_name_of_another() {
-    // A measuring wheel that loses 0.4 % of the way whenever the load comes down faster than 25 mm/s. A muscle that warms up
-    // explains almost all of it, as an offset of the force sensor does of the other one.
+    // A measuring wheel that loses a share of the way whenever the load comes down faster than 25 mm/s. A muscle that warms up
+    // explains almost all of it, as an offset of the force sensor does of the other one; where it is 0.2 %, the error is small enough to be none.
     let whole = as_it_is("nominal_40kg.csv");
     let way = whole.bridged(Contraction).unwrap();
     let velocity = slopes(&whole.time, &way);
-    let mut lost = vec![0.0];
+    let mut moved = vec![0.0];
     for k in 1..way.len() {
         let slips = velocity[k] < -25e-3;
-        lost.push(lost[k - 1] + if slips { 0.004 * velocity[k] * (whole.time[k] - whole.time[k - 1]) } else { 0.0 });
+        moved.push(moved[k - 1] + if slips { velocity[k] * (whole.time[k] - whole.time[k - 1]) } else { 0.0 });
     }
-    let slipping = with_added("nominal_40kg.csv", "contraction", |k| -1e3 * lost[k]);
+    let slipping = |share: f64| with_added("nominal_40kg.csv", "contraction", |k| -1e3 * share * moved[k]);
     // The line of the command talks into the amplifier of the force sensor.
     let command = whole.bridged(Command).unwrap();
     let talking = with_added("nominal_40kg.csv", "force", |k| 2.0 * command[k]);
-    for (spoilt, signal, on) in [(slipping, Contraction, "way moved down"), (talking, Force, "the command")] {
+    for (spoilt, signal, on) in [
+        (slipping(0.004), Contraction, "way moved down"),
+        (slipping(0.002), Contraction, "way moved down"),
+        (talking, Force, "the command"),
+    ] {
         let found = diagnosis_of(&[spoilt]);
         assert_eq!((found.verdict, causes(&found)), (Verdict::Unexplained, vec![]), "{on}");
         let first = &found.remaining[0];
