@@ -84,7 +84,7 @@ pub struct Failed {
 /// then meaningless.
 #[inline]
 pub fn advance<const N: usize>(
-    rates: impl Fn(f64, &[f64; N], &mut [f64; N]),
+    mut rates: impl FnMut(f64, &[f64; N], &mut [f64; N]),
     mut witness: impl FnMut(f64, &[f64; N], f64, &[f64; N], &dyn Fn(f64) -> [f64; N]),
     scale: &[f64; N],
     accuracy: Accuracy,
@@ -100,7 +100,7 @@ pub fn advance<const N: usize>(
         // A rest that is hardly longer than the step is done in one, not in one and a sliver.
         let last = rest <= *step * 1.000_001;
         let h = if last { rest } else { *step };
-        let next = one_step(&rates, time, h, state, &mut stages);
+        let next = one_step(&mut rates, time, h, state, &mut stages);
         let (error, worst) = scaled_error(&stages, h, scale, state, &next);
         let error = error / accuracy.tolerance;
         if error <= 1.0 {
@@ -141,7 +141,7 @@ fn may_lengthen(error: f64, h: f64, step: f64) -> bool {
 
 #[inline]
 fn one_step<const N: usize>(
-    rates: &impl Fn(f64, &[f64; N], &mut [f64; N]),
+    rates: &mut impl FnMut(f64, &[f64; N], &mut [f64; N]),
     time: f64,
     h: f64,
     state: &[f64; N],

@@ -32,7 +32,8 @@ pub trait State: Copy + Send {
     fn as_slice(&self) -> &[f64];
     /// As a slice that can be changed.
     fn as_mut_slice(&mut self) -> &mut [f64];
-    /// See [`integrator::advance`]; of the states of effects only those move whose bits are set in `moving`, and the others rest.
+    /// See [`integrator::advance`]; of the states of effects only those move whose bits are set in `moving`, and the others rest: `rates` may
+    /// leave out theirs.
     ///
     /// # Errors
     /// As [`integrator::advance`].
@@ -40,7 +41,7 @@ pub trait State: Copy + Send {
     fn advance(
         &mut self,
         moving: u64,
-        rates: impl Fn(f64, &Self, &mut Self),
+        rates: impl FnMut(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
@@ -61,7 +62,7 @@ impl<const N: usize> State for [f64; N] {
     fn advance(
         &mut self,
         _moving: u64,
-        rates: impl Fn(f64, &Self, &mut Self),
+        rates: impl FnMut(f64, &Self, &mut Self),
         mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
@@ -81,31 +82,39 @@ impl<const N: usize> State for [f64; N] {
 pub struct Extended<const OWN: usize, const N: usize>(pub [f64; N]);
 
 impl<const OWN: usize, const N: usize> Extended<OWN, N> {
-    /// Advances some of the states, while all others rest: `of` takes them out of all, `with` puts them there.
+    /// Advances some of the states, while all others rest: `of` takes them out of all, `put` puts them there.
     #[inline]
     #[allow(clippy::too_many_arguments)]
     fn advance_some<const M: usize>(
         &mut self,
         of: impl Fn(&Self) -> [f64; M],
-        with: impl Fn(&[f64; M]) -> Self,
-        rates: impl Fn(f64, &Self, &mut Self),
+        put: impl Fn(&[f64; M], &mut Self),
+        mut rates: impl FnMut(f64, &Self, &mut Self),
         mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
+        let resting = *self;
+        let with = |some: &[f64; M]| {
+            let mut all = resting;
+            put(some, &mut all);
+            all
+        };
+        // What rests is put there once.
+        let (mut all, mut all_rates) = (resting, Self::ZERO);
         let rates = |t: f64, some: &[f64; M], out: &mut [f64; M]| {
-            let mut all = Self::ZERO;
-            rates(t, &with(some), &mut all);
-            *out = of(&all);
+            put(some, &mut all);
+            rates(t, &all, &mut all_rates);
+            *out = of(&all_rates);
         };
         let witness = |t0: f64, y0: &[f64; M], t1: f64, y1: &[f64; M], within: &dyn Fn(f64) -> [f64; M]| {
             witness(t0, &with(y0), t1, &with(y1), &|t| with(&within(t)));
         };
         let mut some = of(self);
         some.advance(0, rates, witness, &of(scale), accuracy, step, duration)?;
-        *self = with(&some);
+        put(&some, self);
         Ok(())
     }
 }
@@ -122,7 +131,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
     fn advance(
         &mut self,
         moving: u64,
-        rates: impl Fn(f64, &Self, &mut Self),
+        rates: impl FnMut(f64, &Self, &mut Self),
         witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
@@ -131,31 +140,24 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
     ) -> std::result::Result<(), integrator::Failed> {
         const { assert!(FEW <= N && N <= u64::BITS as usize) };
         let all_moving = moving << OWN | ((1 << OWN) - 1);
-        let resting = *self;
         if moving == 0 {
             let of = |all: &Self| -> [f64; OWN] { std::array::from_fn(|k| all.0[k]) };
-            let with = |own: &[f64; OWN]| {
-                let mut all = resting;
-                all.0[..OWN].copy_from_slice(own);
-                all
-            };
-            self.advance_some(of, with, rates, witness, scale, accuracy, step, duration)
+            let put = |own: &[f64; OWN], all: &mut Self| all.0[..OWN].copy_from_slice(own);
+            self.advance_some(of, put, rates, witness, scale, accuracy, step, duration)
         } else if all_moving.count_ones() as usize <= FEW {
             let positions = positions(all_moving);
             let of = |all: &Self| positions.map(|position| all.0[position]);
-            let with = |few: &[f64; FEW]| {
-                let mut all = resting;
+            let put = |few: &[f64; FEW], all: &mut Self| {
                 positions.iter().zip(few).for_each(|(position, value)| all.0[*position] = *value);
-                all
             };
-            let arrived = self.advance_some(of, with, rates, witness, scale, accuracy, step, duration);
+            let arrived = self.advance_some(of, put, rates, witness, scale, accuracy, step, duration);
             let named = |failed: integrator::Failed| integrator::Failed {
                 state: failed.state.map(|few| positions[few]),
                 ..failed
             };
             arrived.map_err(named)
         } else {
-            self.advance_some(|all| all.0, |all| Self(*all), rates, witness, scale, accuracy, step, duration)
+            self.advance_some(|all| all.0, |moved, all| all.0 = *moved, rates, witness, scale, accuracy, step, duration)
         }
     }
 }

@@ -277,7 +277,8 @@ fn follow<S: System>(
     pull: Option<fn(&S::Outputs) -> f64>,
     given: &[Signal],
 ) -> Result<Replay> {
-    let mut simulator = Simulator::<S>::new(*parameters);
+    let mut simulator =
+        Simulator::<S>::new(Parameters { effects: parameters.effects.without_neutral(), ..*parameters });
     simulator.accuracy = accuracy;
     simulator.inputs = inputs(0, 0.0);
     // What settles counts from the start of the recording.

@@ -353,7 +353,9 @@ macro_rules! chained {
             $(
                 let (own, others) = rest.split_at($Effect::STATE_SCALES.len());
                 rest = others;
-                value = self.$field.$hook(at, own, value);
+                if !self.is_left_out(Place::$Effect) {
+                    value = self.$field.$hook(at, own, value);
+                }
             )*
             let _ = rest;
             value
@@ -368,10 +370,18 @@ macro_rules! effects {
             pub use $field::$Effect;
         )*
 
+        /// Place of each effect in the list.
+        #[derive(Clone, Copy)]
+        enum Place {
+            $($Effect,)*
+        }
+
         /// All effects with their parameters.
         #[derive(Debug, Clone, Copy, Default, PartialEq)]
         pub struct Effects {
             $(#[doc = concat!("See [`", stringify!($Effect), "`].")] pub $field: $Effect,)*
+            /// Those that are left out, each a bit by its place; see [`Effects::without_neutral`].
+            left_out: u32,
         }
 
         impl Effects {
@@ -380,6 +390,21 @@ macro_rules! effects {
             /// What each effect is, in the order of the list.
             pub const DESCRIPTIONS: &'static [Description] = &[$($Effect::DESCRIPTION,)*];
             const STATE_SCALES: &'static [&'static [f64]] = &[$($Effect::STATE_SCALES,)*];
+
+            /// The same, where those that are neutral are not asked at every instant what they do: they must stay neutral.
+            pub fn without_neutral(mut self) -> Self {
+                $(
+                    if self.$field.is_neutral() {
+                        self.left_out |= 1 << Place::$Effect as u32;
+                    }
+                )*
+                self
+            }
+
+            #[inline]
+            fn is_left_out(&self, place: Place) -> bool {
+                self.left_out & 1 << place as u32 != 0
+            }
 
             /// Whether no effect is at work.
             #[inline]
@@ -409,7 +434,7 @@ macro_rules! effects {
 
             /// All effects as they act on where the valve comes to rest, but for what [`Self::rests_off`] says.
             pub fn at_rest(self) -> Self {
-                Self { $($field: self.$field.at_rest(),)* }
+                Self { $($field: self.$field.at_rest(),)* ..self }
             }
 
             /// Those with which a hanging load is simulated, and those that only change its readings then.
@@ -473,7 +498,7 @@ macro_rules! effects {
                 states
             }
 
-            /// Rates of the states of all effects, per second; those of neutral effects are zero.
+            /// Rates of the states of all effects, per second; those that rest keep the ones that they have.
             #[inline]
             pub fn rates(&self, at: &Point, states: &[f64], rates: &mut [f64]) {
                 let (mut rest, mut rest_rates) = (states, rates);
@@ -481,8 +506,8 @@ macro_rules! effects {
                     let (own, others) = rest.split_at($Effect::STATE_SCALES.len());
                     let (own_rates, other_rates) = rest_rates.split_at_mut($Effect::STATE_SCALES.len());
                     (rest, rest_rates) = (others, other_rates);
-                    own_rates.fill(0.0);
-                    if !own.is_empty() && !self.$field.rests() {
+                    if !own.is_empty() && !self.is_left_out(Place::$Effect) && !self.$field.rests() {
+                        own_rates.fill(0.0);
                         self.$field.rates(at, own, own_rates);
                     }
                 )*
@@ -560,21 +585,33 @@ macro_rules! effects {
             /// Cut-off of the valve in rad/s.
             #[inline]
             pub fn valve_bandwidth(&self, at: &Point, mut bandwidth: f64) -> f64 {
-                $(bandwidth = self.$field.valve_bandwidth(at, bandwidth);)*
+                $(
+                    if !self.is_left_out(Place::$Effect) {
+                        bandwidth = self.$field.valve_bandwidth(at, bandwidth);
+                    }
+                )*
                 bandwidth
             }
 
             /// Gauge pressure in Pa that drives the muscle, which without effects would pull with the given static force in N.
             #[inline]
             pub fn effective_pressure(&self, at: &Point, pull: &impl Fn() -> f64, mut pressure: f64) -> f64 {
-                $(pressure = self.$field.effective_pressure(at, pull, pressure);)*
+                $(
+                    if !self.is_left_out(Place::$Effect) {
+                        pressure = self.$field.effective_pressure(at, pull, pressure);
+                    }
+                )*
                 pressure
             }
 
             /// Static pull in N, of pressure and membrane together.
             #[inline]
             pub fn static_force(&self, mut force: f64) -> f64 {
-                $(force = self.$field.static_force(force);)*
+                $(
+                    if !self.is_left_out(Place::$Effect) {
+                        force = self.$field.static_force(force);
+                    }
+                )*
                 force
             }
 
@@ -618,7 +655,11 @@ macro_rules! effects {
             /// What the sensors show.
             #[inline]
             pub fn readings(&self, mut readings: Readings) -> Readings {
-                $(readings = self.$field.readings(readings);)*
+                $(
+                    if !self.is_left_out(Place::$Effect) {
+                        readings = self.$field.readings(readings);
+                    }
+                )*
                 readings
             }
 
