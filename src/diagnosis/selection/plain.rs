@@ -9,10 +9,13 @@ use rayon::prelude::*;
 impl Search<'_> {
     /// The single cause of a fit in a plain form, and one beside it that explains all that it leaves then, as they are told; `None` where it leaves
     /// nothing, or no other cause explains it: where both leave something, the second may as well stand for the first one's form. Measured seals got a
-    /// second cause so.
+    /// second cause so. Two causes that would have no fewer parameters than the single one are not looked for.
     pub fn as_two(&mut self, single: &Fitted) -> Option<Chosen> {
         let [part] = single.hypothesis.parts[..] else { return None };
         let plain = self.in_plain_form(single)?;
+        if plain.fitted.hypothesis.size() + 1 >= single.hypothesis.size() {
+            return None;
+        }
         if !is_unsound(&plain.fitted.losses, &self.bench.data) {
             return None;
         }
