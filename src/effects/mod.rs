@@ -343,6 +343,13 @@ fn at_ends<E: Effect>(effect: &E) -> Vec<&'static str> {
     names
 }
 
+/// What is done with each effect that is not left out, one after the other.
+macro_rules! each_at_work {
+    ($self:ident; $($Effect:ident $do:block)*) => {
+        $(if !$self.is_left_out(Place::$Effect) $do)*
+    };
+}
+
 /// A hook of all effects that have states, one after the other; `states` are those of all effects.
 macro_rules! chained {
     ($doc:literal; $hook:ident; $($field:ident: $Effect:ident;)*) => {
@@ -585,33 +592,21 @@ macro_rules! effects {
             /// Cut-off of the valve in rad/s.
             #[inline]
             pub fn valve_bandwidth(&self, at: &Point, mut bandwidth: f64) -> f64 {
-                $(
-                    if !self.is_left_out(Place::$Effect) {
-                        bandwidth = self.$field.valve_bandwidth(at, bandwidth);
-                    }
-                )*
+                each_at_work!(self; $($Effect { bandwidth = self.$field.valve_bandwidth(at, bandwidth); })*);
                 bandwidth
             }
 
             /// Gauge pressure in Pa that drives the muscle, which without effects would pull with the given static force in N.
             #[inline]
             pub fn effective_pressure(&self, at: &Point, pull: &impl Fn() -> f64, mut pressure: f64) -> f64 {
-                $(
-                    if !self.is_left_out(Place::$Effect) {
-                        pressure = self.$field.effective_pressure(at, pull, pressure);
-                    }
-                )*
+                each_at_work!(self; $($Effect { pressure = self.$field.effective_pressure(at, pull, pressure); })*);
                 pressure
             }
 
             /// Static pull in N, of pressure and membrane together.
             #[inline]
             pub fn static_force(&self, mut force: f64) -> f64 {
-                $(
-                    if !self.is_left_out(Place::$Effect) {
-                        force = self.$field.static_force(force);
-                    }
-                )*
+                each_at_work!(self; $($Effect { force = self.$field.static_force(force); })*);
                 force
             }
 
@@ -655,11 +650,7 @@ macro_rules! effects {
             /// What the sensors show.
             #[inline]
             pub fn readings(&self, mut readings: Readings) -> Readings {
-                $(
-                    if !self.is_left_out(Place::$Effect) {
-                        readings = self.$field.readings(readings);
-                    }
-                )*
+                each_at_work!(self; $($Effect { readings = self.$field.readings(readings); })*);
                 readings
             }
 

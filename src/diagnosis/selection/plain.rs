@@ -13,10 +13,8 @@ impl Search<'_> {
     pub fn as_two(&mut self, single: &Fitted) -> Option<Chosen> {
         let [part] = single.hypothesis.parts[..] else { return None };
         let plain = self.in_plain_form(single)?;
-        if plain.fitted.hypothesis.size() + 1 >= single.hypothesis.size() {
-            return None;
-        }
-        if !is_unsound(&plain.fitted.losses, &self.bench.data) {
+        let may_save = plain.fitted.hypothesis.size() + 1 < single.hypothesis.size();
+        if !may_save || !is_unsound(&plain.fitted.losses, &self.bench.data) {
             return None;
         }
         let mut both = self.extend(&plain.fitted, true, &self.from);
