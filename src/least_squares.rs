@@ -282,19 +282,50 @@ pub fn normal_matrix(columns: &[Vec<f64>]) -> DMatrix<f64> {
     normal
 }
 
-/// How much Σ r², priors among them, can decrease when columns are added to the residuals in amounts within bounds.
-pub fn linear_decrease(residuals: &[f64], columns: &[Vec<f64>], free: &[Free]) -> f64 {
-    let mut normal = normal_matrix(columns);
-    let mut gradient = DVector::from_fn(columns.len(), |k, _| dot(&columns[k], residuals));
-    for (k, free) in free.iter().enumerate() {
-        if let Some((mean, deviation)) = free.prior {
-            normal[(k, k)] += deviation.powi(-2);
-            gradient[k] -= mean / deviation.powi(2);
-        }
+/// Residuals to which columns are added in amounts within bounds, to see what others take off beside these.
+pub struct Adapting {
+    /// The residuals.
+    pub residuals: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+    free: Vec<Free>,
+    normal: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Adapting {
+    /// One amount per column, and from what it is free.
+    pub fn new(residuals: Vec<f64>, columns: Vec<Vec<f64>>, free: Vec<Free>) -> Self {
+        let normal = normal_matrix(&columns);
+        let gradient = DVector::from_fn(columns.len(), |k, _| dot(&columns[k], &residuals));
+        Self { residuals, columns, free, normal, gradient }
     }
-    let bounds: Vec<(f64, f64)> = free.iter().map(|free| (free.lower, free.upper)).collect();
-    let amounts = bounded_minimum(&damped(&normal, SINGULAR), &gradient, &bounds);
-    -2.0 * gradient.dot(&amounts) - (&normal * &amounts).dot(&amounts)
+
+    /// How much Σ r², priors among them, can decrease when other columns are added, too, in amounts within their bounds.
+    pub fn decrease(&self, others: &[Vec<f64>], free: &[Free]) -> f64 {
+        let columns: Vec<&Vec<f64>> = others.iter().chain(&self.columns).collect();
+        let (count, new) = (columns.len(), others.len());
+        let free: Vec<Free> = free.iter().chain(&self.free).copied().collect();
+        let mut normal = DMatrix::zeros(count, count);
+        normal.view_range_mut(new.., new..).copy_from(&self.normal);
+        let mut gradient = DVector::zeros(count);
+        gradient.rows_range_mut(new..).copy_from(&self.gradient);
+        for k in 0..new {
+            gradient[k] = dot(columns[k], &self.residuals);
+            for other in k..count {
+                let product = dot(columns[k], columns[other]);
+                (normal[(k, other)], normal[(other, k)]) = (product, product);
+            }
+        }
+        for (k, free) in free.iter().enumerate() {
+            if let Some((mean, deviation)) = free.prior {
+                normal[(k, k)] += deviation.powi(-2);
+                gradient[k] -= mean / deviation.powi(2);
+            }
+        }
+        let bounds: Vec<(f64, f64)> = free.iter().map(|free| (free.lower, free.upper)).collect();
+        let amounts = bounded_minimum(&damped(&normal, SINGULAR), &gradient, &bounds);
+        -2.0 * gradient.dot(&amounts) - (&normal * &amounts).dot(&amounts)
+    }
 }
 
 /// The damped step of Gauss and Newton within the bounds.
@@ -403,7 +434,7 @@ mod tests {
             }
             ends += 1;
             let columns = derivatives(&residuals, &start, &found.parameters, &found.residuals);
-            let promised = linear_decrease(&found.residuals, &columns, &[free(0.0, -0.1, 0.1); 5]);
+            let promised = Adapting::new(found.residuals, columns, vec![free(0.0, -0.1, 0.1); 5]).decrease(&[], &[]);
             assert!(promised < EFFORT.small_decrease * found.cost, "{k}: {promised} of {}", found.cost);
         }
         assert!(ends > 90, "{ends}");

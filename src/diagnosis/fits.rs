@@ -7,7 +7,7 @@ use super::hypothesis::{
 use super::residuals::{Data, Loss, Scope};
 use super::unlisted::Unlisted;
 use crate::effects::{Description, Freed};
-use crate::least_squares::{self, Effort, Ended, Free, derivatives, linear_decrease, normal_matrix};
+use crate::least_squares::{self, Adapting, Effort, Ended, Free, derivatives, normal_matrix};
 use crate::parameters::Parameters;
 use crate::recent::Recent;
 use crate::variables::Variable;
@@ -81,6 +81,12 @@ impl Fitted {
             .filter(would_do)
             .collect()
     }
+}
+
+/// A fit with what its corrections may take off the residuals, to see what an effect more takes off beside them.
+pub struct Base<'f> {
+    fitted: &'f Fitted,
+    adapting: Adapting,
 }
 
 /// Where a fit starts.
@@ -357,9 +363,9 @@ impl<'a> Bench<'a> {
     }
 
     /// Share of the squares that may go away with an error of readings that has a course of its own, as for starts of effects.
-    pub fn promise_of_course(&self, base: &Fitted, course: &[f64]) -> f64 {
-        self.as_large(course, base)
-            .map_or(0.0, |(_, course)| self.promise(base, vec![weighted(&course, &self.weights)]))
+    pub fn promise_of_course(&self, base: &Base, course: &[f64]) -> f64 {
+        self.as_large(course, base.fitted)
+            .map_or(0.0, |(_, course)| promise(base, vec![weighted(&course, &self.weights)]))
     }
 
     /// By how much a course must be larger to have as large squares as a fit leaves, and as it is then; `None` where it is zero.
@@ -427,12 +433,21 @@ impl<'a> Bench<'a> {
         Fitted { hypothesis: hypothesis.clone(), parameters, residuals, losses }
     }
 
+    /// A fit as one that may get one effect more. Its corrections are free within their bounds.
+    pub fn base<'f>(&self, fitted: &'f Fitted) -> Base<'f> {
+        let each = self.corrections.iter();
+        let free = each.map(|(variable, correction)| correction.from(declared(&fitted.parameters, variable.name).1));
+        let columns = self.slopes.by.iter().map(|slope| weighted(slope, &self.weights));
+        let residuals = weighted(&fitted.residuals, &self.weights);
+        Base { fitted, adapting: Adapting::new(residuals, columns.collect(), free.collect()) }
+    }
+
     /// Where fits of a hypothesis with one effect more start, the most promising first: every start of every
     /// common form.
     ///
     /// How promising is judged from one simulation: how much of the weighted squares of the residuals goes away when the
     /// change that the effect makes is scaled and the corrections and the parameters so far adapt, to first order.
-    pub fn starts(&self, base: &Fitted, effect: &'static Description) -> Vec<Start> {
+    pub fn starts(&self, base: &Base, effect: &'static Description) -> Vec<Start> {
         let forms = self.forms(effect).filter(|part| !part.is_rare());
         let forms = forms.flat_map(|part| (0..part.starts()).map(move |choice| (part, choice)));
         let mut starts: Vec<Start> = forms.filter_map(|(part, choice)| self.start(base, part, choice)).collect();
@@ -458,12 +473,12 @@ impl<'a> Bench<'a> {
     }
 
     /// A hypothesis with one effect more, at one of the starts of its form; `None` where it cannot be simulated.
-    pub fn start(&self, base: &Fitted, part: Part, choice: usize) -> Option<Start> {
-        let parameters = at_start(&base.parameters, part.freed(), choice);
-        let change = |model: &Parameters| Some(weighted(&self.change(base, model)?, &self.weights));
+    pub fn start(&self, base: &Base, part: Part, choice: usize) -> Option<Start> {
+        let parameters = at_start(&base.fitted.parameters, part.freed(), choice);
+        let change = |model: &Parameters| Some(weighted(&self.change(base.fitted, model)?, &self.weights));
         let mut whole = change(&parameters)?;
         if part.has_many_minima() {
-            forgive(&mut whole, &weighted(&base.residuals, &self.weights), self.data.blocks());
+            forgive(&mut whole, &base.adapting.residuals, self.data.blocks());
         }
         // What shows nothing at a usual size cannot be told from nothing.
         if whole.iter().map(|c| c * c).sum::<f64>() < 1.0 {
@@ -475,7 +490,7 @@ impl<'a> Bench<'a> {
         let without =
             anew.map(|(name, _)| neutral(name)).map(|(own, value)| with_values(&parameters, &[own], &[value]));
         let in_others = without.filter_map(|model| change(&model));
-        let promise = self.promise(base, [whole].into_iter().chain(in_others).collect());
+        let promise = promise(base, [whole].into_iter().chain(in_others).collect());
         Some(Start { promise, part, choice, parameters })
     }
 
@@ -523,19 +538,6 @@ impl<'a> Bench<'a> {
         let acts = |start: &Parameters| self.residuals(start) != self.residuals(&with_values(start, &own, &neutral));
         let mut ranked = self.ranked(starts.collect()).into_iter().map(|(_, start)| start);
         ranked.find(|start| own.is_empty() || acts(start))
-    }
-
-    /// Share of the squares that goes away when changes are scaled, up to five times in either direction, and the
-    /// corrections adapt within their bounds.
-    fn promise(&self, base: &Fitted, changes: Vec<Vec<f64>>) -> f64 {
-        let residuals = weighted(&base.residuals, &self.weights);
-        let scale = Free { start: 0.0, lower: -5.0, upper: 5.0, typical: 1.0, prior: None };
-        let (mut free, mut columns) = (vec![scale; changes.len()], changes);
-        for ((variable, correction), slope) in self.corrections.iter().zip(&self.slopes.by) {
-            free.push(correction.from(declared(&base.parameters, variable.name).1));
-            columns.push(weighted(slope, &self.weights));
-        }
-        linear_decrease(&residuals, &columns, &free) / residuals.iter().map(|r| r * r).sum::<f64>()
     }
 
     fn everything_free(&self, hypothesis: &Hypothesis, start: &Parameters) -> (Vec<&'static Variable>, Vec<Free>) {
@@ -614,6 +616,14 @@ impl<'a> Bench<'a> {
         let free = (seen - columns.len() as f64).max(1.0);
         &gradients * gradients.transpose() * (seen / free)
     }
+}
+
+/// Share of the squares that goes away when changes are scaled, up to five times in either direction, and the corrections adapt within their
+/// bounds.
+fn promise(base: &Base, changes: Vec<Vec<f64>>) -> f64 {
+    let scale = Free { start: 0.0, lower: -5.0, upper: 5.0, typical: 1.0, prior: None };
+    let squares: f64 = base.adapting.residuals.iter().map(|r| r * r).sum();
+    base.adapting.decrease(&changes, &vec![scale; changes.len()]) / squares
 }
 
 /// Takes back what a change of residuals does in blocks, numbered and so many, that it makes worse: where each jump hangs on the ones before,

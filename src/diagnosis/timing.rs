@@ -171,7 +171,7 @@ impl Compared<'_> {
         let own = self.losses(0, 0, baseline)?;
         let (best, going) = self.far_better_again(&[own], [baseline].into_iter())?;
         let dead_time = Effects::description("valve_dead_time")?;
-        let start = bench.starts(baseline, dead_time).into_iter().next()?;
+        let start = bench.starts(&bench.base(baseline), dead_time).into_iter().next()?;
         let late = Hypothesis::default().with(start.part);
         let late = self.losses(0, 0, &bench.exact_fit(&late, &start.parameters, Scope::All)?)?;
         (odds(&late, &going, -1.0) >= 0.0).then_some(best)

@@ -59,6 +59,13 @@ impl<'a> Way<'a> {
     }
 
     fn looked_over(self, fitting: &'a Fitting<'a>) -> Search<'a> {
+        let mut search = self.singles(fitting);
+        search.look_beyond();
+        search
+    }
+
+    /// A search that has not looked for causes in no library yet.
+    fn singles(self, fitting: &'a Fitting<'a>) -> Search<'a> {
         Search::new(self.bench, self.baseline, self.allows_most, fitting)
     }
 }
@@ -80,7 +87,7 @@ impl<'a> Begun<'a> {
     /// Those of preparing the second one.
     pub fn of(narrow: Way<'a>, wide: impl Fn() -> Result<Way<'a>>, fitting: &'a Fitting<'a>) -> Result<Self> {
         let at_once = if narrow.says_all() { None } else { Some(wide()?) };
-        Ok(Self { narrow: narrow.looked_over(fitting), at_once })
+        Ok(Self { narrow: narrow.singles(fitting), at_once })
     }
 
     /// Fits of the first way's single effects, not refined, the best first.
@@ -99,6 +106,7 @@ impl<'a> Begun<'a> {
     /// What was found, and the search in the way where less was, if there was one.
     fn both(self, wide: impl Fn() -> Result<Way<'a>>, fitting: &'a Fitting<'a>) -> Result<Option<Both<'a>>> {
         let Self { mut narrow, at_once } = self;
+        narrow.look_beyond();
         // Against coefficients that explain all by themselves several causes would hardly have the odds, and take minutes to find.
         let most = if at_once.as_ref().is_some_and(Way::says_all) { 1 } else { MOST_EFFECTS };
         if at_once.is_none() {

@@ -32,7 +32,7 @@ impl Search<'_> {
                 each.push(cause);
             }
         }
-        let fits = each.into_iter().filter_map(|cause| {
+        let fits = each.into_par_iter().filter_map(|cause| {
             let Beside { cause, course, fit } = self.settled(cause, &shown)?;
             let explains = fit.evidence > LEAST_EVIDENCE
                 && fit.explained > LEAST_EXPLAINED.0
@@ -43,7 +43,7 @@ impl Search<'_> {
             };
             (explains && foretells() == Some(true)).then_some(fit)
         });
-        fits.max_by(|a, b| a.score.total_cmp(&b.score))
+        fits.collect::<Vec<_>>().into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
     /// A cause in the form that does best. The baseline stands for a part of what it does, and moves otherwise than the muscle did: as far as the cause
@@ -73,8 +73,9 @@ impl Search<'_> {
 
     /// Causes that may take something off the error, the most promising first.
     fn most_promising(&self, shown: &Shown, causes: Vec<Unlisted>) -> Vec<Unlisted> {
+        let base = self.bench.base(&self.baseline);
         let promises = causes.into_par_iter().filter_map(|cause| {
-            let promise = self.bench.promise_of_course(&self.baseline, &shown.by(cause)?);
+            let promise = self.bench.promise_of_course(&base, &shown.by(cause)?);
             (promise > 0.0).then_some((cause, promise))
         });
         let mut promising: Vec<(Unlisted, f64)> = promises.collect();

@@ -139,8 +139,12 @@ impl<'a> Search<'a> {
         search.unfitted = others;
         let singles = search.fitted(&search.baseline, promising, FITTED.0);
         search.levels = vec![search.judged_anew(singles)];
-        search.unlisted = search.best_unlisted();
         search
+    }
+
+    /// Looks for causes in no library, too; until then there are none.
+    pub fn look_beyond(&mut self) {
+        self.unlisted = self.best_unlisted();
     }
 
     /// Whether no other search lets the coefficients be off in a way that allows more.
@@ -164,7 +168,7 @@ impl<'a> Search<'a> {
         if is_another {
             self.best_single = None;
             all = self.judged_anew(all);
-            self.unlisted = self.best_unlisted();
+            self.look_beyond();
         }
         self.levels[0] = all;
     }
@@ -270,19 +274,21 @@ impl<'a> Search<'a> {
 
     /// Where fits of single effects start, the most promising of each first.
     fn starts(&self) -> Vec<Vec<Start>> {
-        let starts = Effects::DESCRIPTIONS.par_iter().map(|effect| self.bench.starts(&self.baseline, effect));
+        let base = self.bench.base(&self.baseline);
+        let starts = Effects::DESCRIPTIONS.par_iter().map(|effect| self.bench.starts(&base, effect));
         starts.filter(|starts| !starts.is_empty()).collect()
     }
 
     /// The most promising hypotheses with one effect more, the best first. The base that leads is worth a look at every start;
     /// the others are extended from where each effect alone is best fitted, but for those whose error has many minima.
     fn extend(&self, base: &Fitted, leads: bool, from: &[(Part, usize)]) -> Vec<Judged> {
+        let at = self.bench.base(base);
         let others = from.par_iter().filter(|(part, _)| !base.hypothesis.has(part.effect.name));
         let starts = others.map(|(part, choice)| {
             if leads || has_many_minima(part.effect) {
-                self.bench.starts(base, part.effect)
+                self.bench.starts(&at, part.effect)
             } else {
-                self.bench.start(base, *part, *choice).into_iter().collect()
+                self.bench.start(&at, *part, *choice).into_iter().collect()
             }
         });
         self.fitted(base, starts.filter(|starts| !starts.is_empty()).collect(), FITTED.1)

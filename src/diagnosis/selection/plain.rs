@@ -8,13 +8,22 @@ use rayon::prelude::*;
 
 impl Search<'_> {
     /// The single cause of a fit in a plain form, and one beside it that explains all that it leaves then, as they are told; `None` where it leaves
-    /// nothing, or no other cause explains it: where both leave something, the second may as well stand for the first one's form. Measured seals got a
-    /// second cause so. Two causes that would have no fewer parameters than the single one are not looked for.
+    /// nothing, in the form that it has or in the one that does best, or no other cause explains it: where both leave something, the second may as
+    /// well stand for the first one's form. Measured seals got a second cause so. Two causes that would have no fewer parameters than the single
+    /// one are not looked for.
     pub fn as_two(&mut self, single: &Fitted) -> Option<Chosen> {
         let [part] = single.hypothesis.parts[..] else { return None };
-        let plain = self.in_plain_form(single)?;
-        let may_save = plain.fitted.hypothesis.size() + 1 < single.hypothesis.size();
-        if !may_save || !is_unsound(&plain.fitted.losses, &self.bench.data) {
+        let may_save = |plain: Part| plain.freed().count() + 1 < part.freed().count();
+        if !self.bench.forms(part.effect).chain([part.refined_as(|_| false)]).any(may_save) {
+            return None;
+        }
+        let leaves_nothing = |plain: &Judged| !is_unsound(&plain.fitted.losses, &self.bench.data);
+        let own = self.judge(self.bench.less_refined(single, |_| false)?);
+        if leaves_nothing(&own) {
+            return None;
+        }
+        let plain = self.in_best_plain_form(own);
+        if !may_save(plain.fitted.hypothesis.parts[0]) || leaves_nothing(&plain) {
             return None;
         }
         let mut both = self.extend(&plain.fitted, true, &self.from);
@@ -25,17 +34,15 @@ impl Search<'_> {
         both.extend(others);
         let both = both.into_par_iter().map(|both| self.finished(both)).collect();
         let both = first_of_each(sorted(both).into_iter());
-        let says_all = |both: &&Judged| !is_unsound(&both.fitted.losses, &self.bench.data);
-        let best = possible(&both).filter(says_all)?.clone();
+        let best = possible(&both).filter(|both| leaves_nothing(both))?.clone();
         self.levels.truncate(1);
         self.levels.push(both);
         self.chosen(best).filter(|chosen| chosen.best.hypothesis.parts.len() == 2)
     }
 
-    /// The cause of a fit, be it one to the same data in another way, in the form that does best without refinements.
-    fn in_plain_form(&self, single: &Fitted) -> Option<Judged> {
-        let own = self.judge(self.bench.less_refined(single, |_| false)?);
+    /// A cause without refinements in the form that does best so.
+    fn in_best_plain_form(&self, own: Judged) -> Judged {
         let other = self.in_other_forms(&own, |_| true).map(|other| self.finished(other));
-        other.into_iter().chain([own]).max_by(|a, b| a.score.total_cmp(&b.score))
+        other.filter(|other| other.score > own.score).unwrap_or(own)
     }
 }
