@@ -93,11 +93,23 @@ fn a_command_that_changes_at_its_samples_is_no_cause() {
     }
 }
 
+fn waves(time: f64) -> f64 {
+    2.0 + 0.25 * (1.1 * time).sin() + 0.15 * (2.9 * time + 1.0).sin() + 0.06 * (5.3 * time).sin()
+}
+
+#[test]
+fn a_held_command_is_no_late_valve() {
+    // Waves that are held come half a sampling interval, 10 ms, late. Where the valve lags by a trifle itself, a dead time along straight lines
+    // explains that a little better, but has not the odds for a cause.
+    let mut truth = Parameters::default();
+    truth.effects.valve_dead_time.delay = 2e-3;
+    let found = diagnosis_of(&[muscle(&truth, waves, Between::Held, waves(0.0))]);
+    assert_eq!((found.verdict, causes(&found), found.between), (Verdict::Nominal, vec![], Between::Held));
+}
+
 #[test]
 fn a_held_command_is_no_late_valve_beside_a_cause() {
-    // Waves that are held come half a sampling interval late, which a dead time explains as well; but then there are two causes.
-    let waves =
-        |time: f64| 2.0 + 0.25 * (1.1 * time).sin() + 0.15 * (2.9 * time + 1.0).sin() + 0.06 * (5.3 * time).sin();
+    // The same, but then there would be two causes.
     let mut truth = Parameters::default();
     truth.effects.payload_mass.additional_mass = 4.0;
     let found = diagnosis_of(&[muscle(&truth, waves, Between::Held, waves(0.0))]);

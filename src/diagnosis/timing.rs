@@ -165,7 +165,7 @@ struct Compared<'a> {
 }
 
 impl Compared<'_> {
-    /// Which other way explains what the nominal model leaves far better, and no worse than a dead time would.
+    /// Which other way explains what the nominal model leaves far better, and so well that a dead time has not the odds against it.
     fn needed_at_once(&self, way: &Way) -> Option<usize> {
         let (bench, baseline) = (way.bench(), way.baseline());
         let own = self.losses(0, 0, baseline)?;
@@ -174,11 +174,15 @@ impl Compared<'_> {
         let start = bench.starts(&bench.base(baseline), dead_time).into_iter().next()?;
         let late = Hypothesis::default().with(start.part);
         let late = self.losses(0, 0, &bench.exact_fit(&late, &start.parameters, Scope::All)?)?;
-        (odds(&late, &going, -1.0) >= 0.0).then_some(best)
+        (odds(&going, &late, 1.0) <= LEAST_EVIDENCE).then_some(best)
     }
 
     /// Which other way explains the data far better with one of the best single effects than these do.
     fn needed_by_singles(&self, begun: &Begun) -> Option<usize> {
+        // None is needed to explain more where the nominal model leaves nothing.
+        if begun.needs_no_cause() {
+            return None;
+        }
         let singles: Vec<&Fitted> = begun.singles().take(TRIED).collect();
         let own = singles.iter().map(|single| self.losses(0, 0, single)).collect::<Option<Vec<_>>>()?;
         self.far_better_again(&own, singles.into_iter()).map(|(best, _)| best)
@@ -205,7 +209,7 @@ impl Compared<'_> {
         best(again.filter(|(_, other)| is_worth_it(other) && is_far_better(own, other))).map(|(best, _)| best)
     }
 
-    /// Which of some other ways is no less likely with one of the causes less than were found in one.
+    /// Which of some other ways is so likely with one of the causes less than were found in one that this one has not the odds against it.
     fn needs_less(&self, found: &Found, now: usize, own: &[Loss], others: &[usize]) -> Option<usize> {
         let all = &found.chosen.best;
         let without = |part: &Part| found.bench().neutralised(all, part.effect);
@@ -223,7 +227,7 @@ impl Compared<'_> {
                 }
                 let again = bench.exact_fit(&fewer.hypothesis, &rough.parameters, Scope::All)?;
                 let losses = self.losses(now, *other, &again)?;
-                (odds_against(&losses) <= 0.0).then_some((*other, losses))
+                (odds_against(&losses) <= LEAST_EVIDENCE).then_some((*other, losses))
             });
             best(each)
         });

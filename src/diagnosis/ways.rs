@@ -95,6 +95,12 @@ impl<'a> Begun<'a> {
         self.narrow.singles().iter().map(|single| &single.fitted)
     }
 
+    /// Whether the nominal model leaves no more than a sound one may, by all that is known of the noise.
+    pub fn needs_no_cause(&self) -> bool {
+        let Search { baseline, bench, .. } = &self.narrow;
+        !is_unsound(&baseline.losses, &bench.data)
+    }
+
     /// What was found; `None` where a model cannot be simulated.
     ///
     /// # Errors
