@@ -2,6 +2,7 @@
 
 use super::evidence::{evidence, is_unsound};
 use super::{Judged, LEAST_EVIDENCE, MAY_GO_FURTHER, Search};
+use crate::diagnosis::fits::Base;
 use crate::diagnosis::residuals::Scope;
 use crate::diagnosis::selection::naming::LEAST_EXPLAINED;
 use crate::diagnosis::unlisted::{Shown, Unlisted};
@@ -26,14 +27,15 @@ impl Search<'_> {
             return None;
         }
         let shown = Shown::beside(&self.bench.data, &self.baseline.parameters)?;
+        let base = self.bench.base(&self.baseline);
         let mut each: Vec<Unlisted> = Vec::new();
-        for cause in self.most_promising(&shown, Unlisted::all()) {
+        for cause in self.most_promising(&base, &shown, Unlisted::all()) {
             if !each.iter().any(|known| known.is_like(cause)) {
                 each.push(cause);
             }
         }
         let fits = each.into_par_iter().filter_map(|cause| {
-            let Beside { cause, course, fit } = self.settled(cause, &shown)?;
+            let Beside { cause, course, fit } = self.settled(&base, &shown, cause)?;
             let explains = fit.evidence > LEAST_EVIDENCE
                 && fit.explained > LEAST_EXPLAINED.0
                 && self.shows(&self.baseline.losses, &fit.fitted.losses);
@@ -48,14 +50,14 @@ impl Search<'_> {
 
     /// A cause in the form that does best. The baseline stands for a part of what it does, and moves otherwise than the muscle did: as far as the cause
     /// explains a good part, it is looked at again beside the model that is left.
-    fn settled(&self, cause: Unlisted, shown: &Shown) -> Option<Beside> {
-        let mut best = self.beside_nearby(cause, shown)?;
+    fn settled(&self, base: &Base, shown: &Shown, cause: Unlisted) -> Option<Beside> {
+        let mut best = self.beside_nearby(base, shown, cause)?;
         for _ in 0..MOST_ROUNDS {
             if best.fit.explained < MAY_GO_FURTHER {
                 break;
             }
             let shown = Shown::beside(&self.bench.data, &best.fit.fitted.parameters)?;
-            match self.beside_nearby(best.cause, &shown) {
+            match self.beside_nearby(base, &shown, best.cause) {
                 Some(next) if next.fit.score > best.fit.score => best = next,
                 _ => break,
             }
@@ -64,18 +66,17 @@ impl Search<'_> {
     }
 
     /// The most promising form near one, fitted.
-    fn beside_nearby(&self, cause: Unlisted, shown: &Shown) -> Option<Beside> {
-        let cause = self.most_promising(shown, cause.nearby()).into_iter().next()?;
+    fn beside_nearby(&self, base: &Base, shown: &Shown, cause: Unlisted) -> Option<Beside> {
+        let cause = self.most_promising(base, shown, cause.nearby()).into_iter().next()?;
         let course = shown.by(cause)?;
         let fit = self.judge(self.bench.fit_beside(&self.baseline, cause, &course, Scope::All)?);
         Some(Beside { cause, course, fit })
     }
 
     /// Causes that may take something off the error, the most promising first.
-    fn most_promising(&self, shown: &Shown, causes: Vec<Unlisted>) -> Vec<Unlisted> {
-        let base = self.bench.base(&self.baseline);
+    fn most_promising(&self, base: &Base, shown: &Shown, causes: Vec<Unlisted>) -> Vec<Unlisted> {
         let promises = causes.into_par_iter().filter_map(|cause| {
-            let promise = self.bench.promise_of_course(&base, &shown.by(cause)?);
+            let promise = self.bench.promise_of_course(base, &shown.by(cause)?);
             (promise > 0.0).then_some((cause, promise))
         });
         let mut promising: Vec<(Unlisted, f64)> = promises.collect();
