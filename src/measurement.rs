@@ -353,6 +353,45 @@ impl Recording {
         })
     }
 
+    /// Pairs of samples of a signal between which it is not known for longer than some time in s.
+    pub(crate) fn gaps(&self, signal: Signal, longest: f64) -> Vec<(usize, usize)> {
+        let values = self.get(signal).unwrap_or_default();
+        let known: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).collect();
+        let pairs = known.windows(2).map(|pair| (pair[0], pair[1]));
+        pairs.filter(|(from, to)| self.time[*to] - self.time[*from] > longest).collect()
+    }
+
+    /// The recording with an instant more in the middle between any two samples, its signals off the straight lines through their gaps longer
+    /// than some time in s: in the middle by the most that they are off the same line within as long before and after. `None` where they are on these lines.
+    pub(crate) fn bent_in_gaps(&self, longest: f64) -> Option<Self> {
+        let mut bent = self.with_middles(|_, values, k| 0.5 * (values[k] + values[k + 1]));
+        let mut is_bent = false;
+        for (signal, values) in &mut bent.signals {
+            for (from, to) in self.gaps(*signal, longest) {
+                let off = self.off_line(*signal, from, to);
+                is_bent |= off != 0.0;
+                let (middle, half) = (0.5 * (self.time[to] + self.time[from]), 0.5 * (self.time[to] - self.time[from]));
+                for (time, value) in bent.time.iter().zip(values.iter_mut()) {
+                    *value += off * (1.0 - (time - middle).abs() / half).max(0.0);
+                }
+            }
+        }
+        is_bent.then_some(bent)
+    }
+
+    /// The most that a signal is off the straight line through two of its samples, within as long before and after as they are apart.
+    fn off_line(&self, signal: Signal, from: usize, to: usize) -> f64 {
+        let values = self.get(signal).unwrap_or_default();
+        let length = self.time[to] - self.time[from];
+        let off = |k: usize| {
+            values[k] - values[from] - (self.time[k] - self.time[from]) / length * (values[to] - values[from])
+        };
+        let near = (0..values.len()).filter(|k| {
+            (self.time[from] - length..=self.time[to] + length).contains(&self.time[*k]) && !values[*k].is_nan()
+        });
+        near.map(off).fold(0.0, |most: f64, off| if off.abs() > most.abs() { off } else { most })
+    }
+
     /// The recording of a command that went so between its samples; until this is said, along straight lines.
     pub fn going(&self, between: Between) -> Self {
         Self { between, ..self.clone() }
@@ -650,6 +689,24 @@ mod tests {
         let off = command.iter().zip(&doubled.time).map(|(u, t)| (u - cubic(*t)).abs());
         assert!(off.skip(2).take(19).all(|off| off < 1e-10), "{command:?}");
         assert_eq!(command[1], 0.5 * (command[0] + command[2]));
+    }
+
+    #[test]
+    fn inputs_bend_in_gaps_as_they_do_around() {
+        // 1 s a sample; from 5 s on 4 s are lost. Through the ends of that a line of 0.5 V/s, from which the command before is 2 V off at most.
+        let time = |k: usize| if k > 5 { k + 3 } else { k } as f64;
+        let command = |k: usize| if k > 5 { 5.0 + 0.5 * (time(k) - 9.0) } else { 3.0 };
+        let text = rows("time [s],command [V],contraction [mm]", |k| format!("{},{},{k}", time(k), command(k)));
+        let recording = parse(&text).unwrap();
+        assert_eq!(recording.gaps(Command, 3.0), [(5, 6)]);
+        let bent = recording.bent_in_gaps(3.0).unwrap();
+        assert_eq!(bent.get(Command).unwrap()[9..14], [3.0, 3.0, 4.0 + 2.0, 5.0, 5.25]);
+        assert!(recording.bent_in_gaps(5.0).is_none(), "there is no gap as long");
+        let plateau = rows("time [s],command [V],contraction [mm]", |k| format!("{},3,7", time(k)));
+        assert!(
+            parse(&plateau).unwrap().bent_in_gaps(3.0).is_none(),
+            "a command that rests on either side rests between"
+        );
     }
 
     /// What the command is in the middle between its samples if jumps are early, and if they are late.

@@ -2,16 +2,17 @@
 
 use super::noise::{self, Noise};
 use crate::integrator::Accuracy;
-use crate::measurement::{Recording, Signal};
+use crate::measurement::{Between, Recording, Signal};
 use crate::parameters::Parameters;
 use crate::quality::correlation;
+use crate::quality::sampling::longest_allowed;
 use crate::quality::sensors::resolution;
 use crate::recent::Recent;
 use crate::simulation::{OUTPUTS, Replay, in_recording, replay, replay_remembering, replay_within};
 use crate::start::pressure_deviation;
 use crate::{Error, Result};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -143,7 +144,7 @@ impl<'a> Data<'a> {
         let mut data = Self {
             recordings,
             held_out_from: last_part(recordings),
-            segments: segments(recordings, nominal)?,
+            segments: segments(recordings, nominal, tolerance)?,
             noise: BTreeMap::new(),
             mistimed: Vec::new(),
             by_start: Vec::new(),
@@ -546,22 +547,62 @@ fn share_to_whiten(residuals: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
     if doubt > 0.0 { (1.0 - 1.0 / (1.0 + doubt).sqrt()) / doubt * shared } else { 0.0 }
 }
 
-/// The samples that can be compared: measured, changing, and an output of the simulation.
-fn segments(recordings: &[Recording], nominal: &Parameters) -> Result<Vec<Segment>> {
+/// The samples that can be compared: measured, changing, an output of the simulation, and no longer in doubt after a gap.
+fn segments(recordings: &[Recording], nominal: &Parameters, tolerance: f64) -> Result<Vec<Segment>> {
     let mut segments = Vec::new();
     for (recording, read) in recordings.iter().enumerate() {
         let simulated = replay(nominal, read)?;
+        let doubt = GapDoubt::of(nominal, read);
         for signal in OUTPUTS {
             let (Some(measured), Some(_)) = (read.get(signal), simulated.get(signal)) else { continue };
-            let samples: Vec<usize> = (0..measured.len()).filter(|&k| measured[k].is_finite()).collect();
+            let least = STRUCTURE_SHARE * tolerance * span(measured);
+            let doubted = doubt.as_ref().map(|doubt| doubt.doubted(signal, least));
+            let is_sure = |k: &usize| doubted.as_ref().is_none_or(|doubted| !doubted[*k]);
+            let samples: Vec<usize> =
+                (0..measured.len()).filter(|&k| measured[k].is_finite()).filter(is_sure).collect();
             // A sensor that always shows the same says nothing of the model.
-            if span(measured) > 0.0 {
+            if span(measured) > 0.0 && !samples.is_empty() {
                 segments.push(Segment { recording, signal, samples, range: 0..0 });
             }
         }
     }
     number(&mut segments);
     Ok(segments)
+}
+
+/// What inputs that nobody knows, in the gaps of a recording, may do to a simulation.
+struct GapDoubt {
+    /// The last known samples before gaps.
+    begins: BTreeSet<usize>,
+    /// Simulation with inputs on straight lines.
+    straight: Replay,
+    /// The same with inputs off them in the gaps, at twice as many instants.
+    bent: Replay,
+}
+
+impl GapDoubt {
+    /// `None` where the inputs have no gap, or stay on straight lines on either side of it. It is the same however the command went between samples.
+    fn of(nominal: &Parameters, recording: &Recording) -> Option<Self> {
+        let recording = recording.going(Between::Lines);
+        let longest = longest_allowed(recording.period(), &recording, nominal);
+        let bent = replay(nominal, &recording.bent_in_gaps(longest)?).ok()?;
+        let of_signal = |signal: &Signal| recording.gaps(*signal, longest).into_iter().map(|(from, _)| from);
+        let begins = OUTPUTS.iter().chain([&Signal::Command]).flat_map(of_signal).collect();
+        Some(Self { begins, straight: replay(nominal, &recording).ok()?, bent })
+    }
+
+    /// Which samples of a signal may be off by more than what is the least that counts: from a gap on until it never is any more.
+    fn doubted(&self, signal: Signal, least: f64) -> Vec<bool> {
+        let [straight, bent] = [&self.straight, &self.bent].map(|replay| replay.get(signal).unwrap_or_default());
+        let mut doubted = vec![false; straight.len()];
+        let mut is_doubted = false;
+        for k in (self.begins.first().copied().unwrap_or(0)..straight.len()).rev() {
+            is_doubted &= !self.begins.contains(&k);
+            is_doubted |= (bent[2 * k] - straight[k]).abs() > least;
+            doubted[k] = is_doubted;
+        }
+        doubted
+    }
 }
 
 fn number(segments: &mut [Segment]) {

@@ -3,7 +3,7 @@
 //! Judged before any fit, from the recordings and from static relations of the nominal model. Each finding is a sentence
 //! for a person; where going on makes no sense it is an error. Every limit states its reason where it is declared.
 
-mod sampling;
+pub(crate) mod sampling;
 pub(crate) mod sensors;
 mod units;
 

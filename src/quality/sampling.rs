@@ -22,19 +22,15 @@ pub fn notes(recording: &Recording, parameters: &Parameters) -> Vec<String> {
     let intervals: Vec<f64> = recording.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let Some(usual) = quantile(&intervals, 0.5) else { return Vec::new() };
     let mut notes = Vec::new();
-    let drives = recording.get(Signal::Command).is_some() && !parameters.valve.is_shut(recording.duration());
-    let valve_time = drives.then(|| 1.0 / parameters.valve.bandwidth);
-    // What is shorter than the valve's own time loses nothing.
-    let longest_allowed = (GAP * usual).max(valve_time.unwrap_or(0.0));
-    notes.extend(
-        gaps(&recording.time, longest_allowed)
-            .map(|found| format!("{found}: inputs are joined by straight lines there")),
-    );
+    let longest_allowed = longest_allowed(usual, recording, parameters);
+    notes.extend(gaps(&recording.time, longest_allowed).map(|found| {
+        format!("{found}: inputs are joined by straight lines there, and what these may do wrong is not compared")
+    }));
     let inputs_and_outputs = OUTPUTS.into_iter().chain([Signal::Command]);
     notes.extend(inputs_and_outputs.filter_map(|signal| missing(recording, signal, longest_allowed)));
     notes.extend(uneven(&intervals));
     notes.extend(leaps(recording));
-    notes.extend(valve_time.filter(|time| usual > *time).map(|time| {
+    notes.extend(valve_time(recording, parameters).filter(|time| usual > *time).map(|time| {
         format!(
             "samples are {} s apart and the valve answers within {} s: its lag, dead time and resonance cannot be judged",
             rounded(usual),
@@ -42,6 +38,17 @@ pub fn notes(recording: &Recording, parameters: &Parameters) -> Vec<String> {
         )
     }));
     notes
+}
+
+/// Time constant of the valve in s, where it matters.
+fn valve_time(recording: &Recording, parameters: &Parameters) -> Option<f64> {
+    let drives = recording.get(Signal::Command).is_some() && !parameters.valve.is_shut(recording.duration());
+    drives.then(|| 1.0 / parameters.valve.bandwidth)
+}
+
+/// The longest interval in s that is no gap, given the usual one: what is shorter than the valve's own time loses nothing.
+pub(crate) fn longest_allowed(usual: f64, recording: &Recording, parameters: &Parameters) -> f64 {
+    (GAP * usual).max(valve_time(recording, parameters).unwrap_or(0.0))
 }
 
 /// Intervals between times that are longer than allowed, in words.
