@@ -242,10 +242,16 @@ impl Recording {
         self.units.get(&signal).copied()
     }
 
+    /// Samples at which a signal is known.
+    fn known(&self, signal: Signal) -> Vec<usize> {
+        let values = self.get(signal).unwrap_or_default();
+        (0..values.len()).filter(|&k| !values[k].is_nan()).collect()
+    }
+
     /// A signal with its gaps bridged by straight lines, for use as an input.
     pub fn bridged(&self, signal: Signal) -> Option<Vec<f64>> {
         let values = self.get(signal)?;
-        let known: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).collect();
+        let known = self.known(signal);
         let (first, last) = (*known.first()?, *known.last()?);
         let mut bridged = values.to_vec();
         bridged[..first].fill(values[first]);
@@ -355,8 +361,7 @@ impl Recording {
 
     /// Pairs of samples of a signal between which it is not known for longer than some time in s.
     pub(crate) fn gaps(&self, signal: Signal, longest: f64) -> Vec<(usize, usize)> {
-        let values = self.get(signal).unwrap_or_default();
-        let known: Vec<usize> = (0..values.len()).filter(|&k| !values[k].is_nan()).collect();
+        let known = self.known(signal);
         let pairs = known.windows(2).map(|pair| (pair[0], pair[1]));
         pairs.filter(|(from, to)| self.time[*to] - self.time[*from] > longest).collect()
     }
@@ -364,19 +369,23 @@ impl Recording {
     /// The recording with an instant more in the middle between any two samples, its signals off the straight lines through their gaps longer
     /// than some time in s: in the middle by the most that they are off the same line within as long before and after. `None` where they are on these lines.
     pub(crate) fn bent_in_gaps(&self, longest: f64) -> Option<Self> {
+        let bends_of = |signal: &Signal| {
+            let bend = |(from, to)| (*signal, from, to, self.off_line(*signal, from, to));
+            self.gaps(*signal, longest).into_iter().map(bend).collect::<Vec<_>>()
+        };
+        let bends: Vec<_> = self.signals.keys().flat_map(bends_of).filter(|(.., off)| *off != 0.0).collect();
+        if bends.is_empty() {
+            return None;
+        }
         let mut bent = self.with_middles(|_, values, k| 0.5 * (values[k] + values[k + 1]));
-        let mut is_bent = false;
-        for (signal, values) in &mut bent.signals {
-            for (from, to) in self.gaps(*signal, longest) {
-                let off = self.off_line(*signal, from, to);
-                is_bent |= off != 0.0;
-                let (middle, half) = (0.5 * (self.time[to] + self.time[from]), 0.5 * (self.time[to] - self.time[from]));
-                for (time, value) in bent.time.iter().zip(values.iter_mut()) {
-                    *value += off * (1.0 - (time - middle).abs() / half).max(0.0);
-                }
+        for (signal, from, to, off) in bends {
+            let (middle, half) = (0.5 * (self.time[to] + self.time[from]), 0.5 * (self.time[to] - self.time[from]));
+            let values = bent.signals.get_mut(&signal).into_iter().flatten();
+            for (time, value) in bent.time.iter().zip(values) {
+                *value += off * (1.0 - (time - middle).abs() / half).max(0.0);
             }
         }
-        is_bent.then_some(bent)
+        Some(bent)
     }
 
     /// The most that a signal is off the straight line through two of its samples, within as long before and after as they are apart.
@@ -386,9 +395,8 @@ impl Recording {
         let off = |k: usize| {
             values[k] - values[from] - (self.time[k] - self.time[from]) / length * (values[to] - values[from])
         };
-        let near = (0..values.len()).filter(|k| {
-            (self.time[from] - length..=self.time[to] + length).contains(&self.time[*k]) && !values[*k].is_nan()
-        });
+        let around = self.time[from] - length..=self.time[to] + length;
+        let near = self.known(signal).into_iter().filter(|k| around.contains(&self.time[*k]));
         near.map(off).fold(0.0, |most: f64, off| if off.abs() > most.abs() { off } else { most })
     }
 

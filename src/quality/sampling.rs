@@ -72,15 +72,13 @@ fn missing(recording: &Recording, signal: Signal, longest_allowed: f64) -> Optio
     if share > MOSTLY {
         return Some(format!("`{}` is missing in {:.0} % of the rows", signal.name(), 100.0 * share));
     }
-    let known = recording.time.iter().zip(values).enumerate().filter(|(_, (_, value))| !value.is_nan());
-    let known: Vec<(usize, f64)> = known.map(|(row, (time, _))| (row, *time)).collect();
-    let own = known
-        .windows(2)
-        .filter(|pair| pair[1].0 > pair[0].0 + 1)
-        .max_by(|a, b| (a[1].1 - a[0].1).total_cmp(&(b[1].1 - b[0].1)))?;
-    let (from, to) = (own[0].1, own[1].1);
-    (to - from > longest_allowed)
-        .then(|| format!("`{}` is missing from {} s to {} s", signal.name(), rounded(from), rounded(to)))
+    let length = |(from, to): &(usize, usize)| recording.time[*to] - recording.time[*from];
+    let gaps = recording.gaps(signal, longest_allowed).into_iter();
+    let own = gaps.filter(|(from, to)| *to > from + 1).max_by(|a, b| length(a).total_cmp(&length(b)));
+    own.map(|(from, to)| {
+        let [from, to] = [from, to].map(|at| rounded(recording.time[at]));
+        format!("`{}` is missing from {from} s to {to} s", signal.name())
+    })
 }
 
 fn uneven(intervals: &[f64]) -> Option<String> {
