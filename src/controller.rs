@@ -368,7 +368,7 @@ impl System for PidFeedForward {
         if sample_time == 0.0 {
             return;
         }
-        let start = Held { start: step.time, taken: 0.0, state: step.state, command: 0.0, feed_forward: 0.0 };
+        let start = Held { start: step.time, taken: 0.0, state: *step.state, command: 0.0, feed_forward: 0.0 };
         let held = memory.0.get_or_insert(start);
         // The sample at the end of the step belongs to the next one, whose inputs are not known yet.
         let end = step.time + step.duration - 2.0 * ROUNDING * sample_time;

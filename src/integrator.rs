@@ -75,8 +75,8 @@ pub struct Failed {
 
 /// Advances `state` over `duration` seconds.
 ///
-/// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness(t0, y0, t1, y1, y)` is
-/// told of every accepted step, with the solution `y(t)` within it; `scale` is the usual size of each state, and
+/// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness([t0, t1], ends, y)` is
+/// told of every accepted step, with the states `ends()` at both ends and the solution `y(t)` within it; `scale` is the usual size of each state, and
 /// `accuracy` the error of one step relative to it, and how many may be made; `step` is the step proposed by the last call and is updated.
 ///
 /// # Errors
@@ -85,7 +85,7 @@ pub struct Failed {
 #[inline]
 pub fn advance<const N: usize>(
     mut rates: impl FnMut(f64, &[f64; N], &mut [f64; N]),
-    mut witness: impl FnMut(f64, &[f64; N], f64, &[f64; N], &dyn Fn(f64) -> [f64; N]),
+    mut witness: impl FnMut([f64; 2], &dyn Fn() -> [[f64; N]; 2], &dyn Fn(f64) -> [f64; N]),
     scale: &[f64; N],
     accuracy: Accuracy,
     state: &mut [f64; N],
@@ -105,7 +105,7 @@ pub fn advance<const N: usize>(
         let error = error / accuracy.tolerance;
         if error <= 1.0 {
             let within = |t: f64| within_step((t - time) / h, h, state, &next, &stages);
-            witness(time, state, time + h, &next, &within);
+            witness([time, time + h], &|| [*state, next], &within);
             *state = next;
             time += h;
             stages[0] = stages[6]; // first same as last
@@ -223,8 +223,7 @@ mod tests {
         for call in [1e-4, 1e-3, 1e-2, 0.25, 1.0] {
             let (mut state, mut step) = ([1.0, 0.0, 1.0], 1e-3);
             for _ in 0..(1.0_f64 / call).round() as usize {
-                advance(rates, |_, _, _, _, _| {}, &[1.0, 10.0, 1.0], Accuracy::USUAL, &mut state, &mut step, call)
-                    .unwrap();
+                advance(rates, |_, _, _| {}, &[1.0, 10.0, 1.0], Accuracy::USUAL, &mut state, &mut step, call).unwrap();
             }
             let exact = [10.0_f64.cos(), -10.0 * 10.0_f64.sin(), (-3.0_f64).exp()];
             for (is, should) in state.iter().zip(exact) {
@@ -237,7 +236,7 @@ mod tests {
     fn the_solution_within_a_step_is_of_order_four() {
         let largest_error = |h: f64| {
             let mut most = 0.0_f64;
-            let witness = |_: f64, _: &[f64; 3], _: f64, _: &[f64; 3], within: &dyn Fn(f64) -> [f64; 3]| {
+            let witness = |_: [f64; 2], _: &dyn Fn() -> [[f64; 3]; 2], within: &dyn Fn(f64) -> [f64; 3]| {
                 for k in 0..=10 {
                     let t = h * f64::from(k) / 10.0;
                     let exact = [(10.0 * t).cos(), -10.0 * (10.0 * t).sin(), (-3.0 * t).exp()];
@@ -263,15 +262,14 @@ mod tests {
     #[test]
     fn an_explosion_is_reported_with_its_time() {
         let explode = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = y[0] * y[0];
-        let failed =
-            advance(explode, |_, _, _, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
+        let failed = advance(explode, |_, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
         assert!((failed.after - 1.0).abs() < 1e-3, "1/(1 - t) ends at 1 s, not {}", failed.after);
     }
 
     #[test]
     fn a_stiffness_without_sense_ends() {
         let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e12 * y[0];
-        assert!(advance(stiff, |_, _, _, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, 1.0).is_err());
+        assert!(advance(stiff, |_, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, 1.0).is_err());
     }
 
     #[test]
@@ -279,7 +277,7 @@ mod tests {
         let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e6 * y[0];
         let within = |most_steps: f64| {
             let accuracy = Accuracy { most_steps, ..Accuracy::USUAL };
-            advance(stiff, |_, _, _, _, _| {}, &[1.0], accuracy, &mut [1.0], &mut 1e-6, 0.1)
+            advance(stiff, |_, _, _| {}, &[1.0], accuracy, &mut [1.0], &mut 1e-6, 0.1)
         };
         // Stability allows steps of 3.3 µs.
         assert_eq!(within(1e6), Ok(()));

@@ -42,7 +42,7 @@ pub trait State: Copy + Send {
         &mut self,
         moving: u64,
         rates: impl FnMut(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        witness: impl FnMut([f64; 2], &dyn Fn() -> [Self; 2], &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
@@ -63,14 +63,14 @@ impl<const N: usize> State for [f64; N] {
         &mut self,
         _moving: u64,
         rates: impl FnMut(f64, &Self, &mut Self),
-        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        mut witness: impl FnMut([f64; 2], &dyn Fn() -> [Self; 2], &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
         if N == 0 {
-            witness(0.0, self, duration, self, &|_| Self::ZERO);
+            witness([0.0, duration], &|| [Self::ZERO; 2], &|_| Self::ZERO);
             return Ok(());
         }
         integrator::advance(rates, witness, scale, accuracy, self, step, duration)
@@ -90,7 +90,7 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
         of: impl Fn(&Self) -> [f64; M],
         put: impl Fn(&[f64; M], &mut Self),
         mut rates: impl FnMut(f64, &Self, &mut Self),
-        mut witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        mut witness: impl FnMut([f64; 2], &dyn Fn() -> [Self; 2], &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
@@ -109,8 +109,8 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
             rates(t, &all, &mut all_rates);
             *out = of(&all_rates);
         };
-        let witness = |t0: f64, y0: &[f64; M], t1: f64, y1: &[f64; M], within: &dyn Fn(f64) -> [f64; M]| {
-            witness(t0, &with(y0), t1, &with(y1), &|t| with(&within(t)));
+        let witness = |times: [f64; 2], ends: &dyn Fn() -> [[f64; M]; 2], within: &dyn Fn(f64) -> [f64; M]| {
+            witness(times, &|| ends().map(|some| with(&some)), &|t| with(&within(t)));
         };
         let mut some = of(self);
         some.advance(0, rates, witness, &of(scale), accuracy, step, duration)?;
@@ -125,7 +125,7 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
         &mut self,
         positions: [usize; M],
         rates: impl FnMut(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        witness: impl FnMut([f64; 2], &dyn Fn() -> [Self; 2], &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
@@ -157,7 +157,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         &mut self,
         moving: u64,
         rates: impl FnMut(f64, &Self, &mut Self),
-        witness: impl FnMut(f64, &Self, f64, &Self, &dyn Fn(f64) -> Self),
+        witness: impl FnMut([f64; 2], &dyn Fn() -> [Self; 2], &dyn Fn(f64) -> Self),
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
@@ -291,7 +291,13 @@ pub trait System: Copy + Send + 'static {
         (step.inputs.along(&step.slopes, after), step.slopes, step.duration - after)
     }
     /// Takes note of what the state has become between two times in s.
-    fn witness(_memory: &mut Self::Memory, _parameters: &Parameters, _times: [f64; 2], _states: [&Self::State; 2]) {}
+    fn witness(
+        _memory: &mut Self::Memory,
+        _parameters: &Parameters,
+        _times: [f64; 2],
+        _states: &dyn Fn() -> [Self::State; 2],
+    ) {
+    }
     /// Whether it remembers what only steps as short as between samples tell precisely enough.
     fn remembers_finely(_parameters: &Parameters) -> bool {
         false
@@ -324,7 +330,7 @@ pub struct Step<'a, S: System> {
     /// Time at its start, s.
     pub time: f64,
     /// State at its start.
-    pub state: S::State,
+    pub state: &'a S::State,
     /// Inputs at its start.
     pub inputs: S::Inputs,
     /// Derivatives of the inputs, per second.
@@ -472,7 +478,7 @@ impl<S: System> Simulator<S> {
 
     /// The step that is to come.
     fn coming(&self, duration: f64) -> Step<'_, S> {
-        let Self { ref parameters, inputs, slopes, clock: Clock { time, .. }, state, .. } = *self;
+        let Self { ref parameters, inputs, slopes, clock: Clock { time, .. }, ref state, .. } = *self;
         Step { parameters, time, state, inputs, slopes, duration }
     }
 
@@ -490,31 +496,31 @@ impl<S: System> Simulator<S> {
     /// As [`Simulator::advance`].
     pub fn advance_past(&mut self, duration: f64, instants: &[f64], see: &mut dyn FnMut(S::Outputs)) -> Result<()> {
         let mark = self.memory.mark(self.clock.time);
-        let (state, step) = match self.integrate(duration, instants, see) {
-            Ok(arrived) => arrived,
-            Err(error) => {
-                self.memory.roll_back(mark);
-                return Err(error);
-            }
-        };
+        let before = (self.state, self.step);
+        if let Err(error) = self.integrate(&before.0, duration, instants, see) {
+            (self.state, self.step) = before;
+            self.memory.roll_back(mark);
+            return Err(error);
+        }
         self.inputs = self.inputs.along(&self.slopes, duration);
         self.slopes = S::Inputs::default();
-        (self.state, self.step) = (state, step);
         self.clock.time += duration;
         S::forget(&mut self.memory, &self.parameters, self.clock.time);
         Ok(())
     }
 
-    /// State and proposed step after a duration in s. Of the simulator only its memory goes along.
+    /// Has state and memory, but neither clock nor inputs, go on from a state by a duration in s.
     fn integrate(
         &mut self,
+        from: &S::State,
         duration: f64,
         instants: &[f64],
         see: &mut dyn FnMut(S::Outputs),
-    ) -> Result<(S::State, f64)> {
-        let Self { ref parameters, inputs, slopes, accuracy, clock, mut state, mut step, ref mut memory } = *self;
+    ) -> Result<()> {
+        let Self { ref parameters, inputs, slopes, accuracy, clock, ref mut state, ref mut step, ref mut memory } =
+            *self;
         let time = clock.time;
-        let coming = Step { parameters, time, state, inputs, slopes, duration };
+        let coming = Step { parameters, time, state: from, inputs, slopes, duration };
         let extent = S::extent(parameters);
         S::expect(memory, &coming);
         let mut instants = instants.iter().copied().peekable();
@@ -529,21 +535,21 @@ impl<S: System> Simulator<S> {
                 }
             };
             let start = time + after;
-            let witness = |t0: f64, y0: &S::State, t1: f64, y1: &S::State, within: &dyn Fn(f64) -> S::State| {
-                S::witness(memory, parameters, [start + t0, start + t1], [y0, y1]);
+            let witness = |[t0, t1]: [f64; 2], ends: &dyn Fn() -> [S::State; 2], within: &dyn Fn(f64) -> S::State| {
+                S::witness(memory, parameters, [start + t0, start + t1], ends);
                 while let Some(instant) = instants.next_if(|instant| instant - after < t1) {
                     let (clock, inputs) = (clock.later(instant), inputs.along(&slopes, instant));
                     see(S::outputs(parameters, clock, &inputs, &within(instant - after), memory));
                 }
             };
-            let passed = state.advance(extent.moving(), rates, witness, &S::SCALE, accuracy, &mut step, span);
+            let passed = state.advance(extent.moving(), rates, witness, &S::SCALE, accuracy, step, span);
             passed.map_err(|failed| diverged::<S>(time + after, &failed))?;
             // On, even where a passage is shorter than rounding.
             after = if span < duration - after { (after + span).max(after.next_up()) } else { duration };
         }
-        match S::left_range(parameters, &inputs.along(&slopes, duration), &state) {
+        match S::left_range(parameters, &inputs.along(&slopes, duration), state) {
             Some(variable) => Err(Error::Diverged { time: time + duration, variable }),
-            None => Ok((state, step)),
+            None => Ok(()),
         }
     }
 
@@ -790,9 +796,9 @@ mod tests {
             let see = |seen: &mut Vec<[f64; 14]>, t1: f64, within: &dyn Fn(f64) -> Extended<2, 14>| {
                 seen.push(within(0.5 * t1).0);
             };
-            let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_all, t1, within);
+            let witness = |[_, t1]: [f64; 2], _: &dyn Fn() -> _, within: &dyn Fn(f64) -> _| see(of_all, t1, within);
             all.advance(u64::MAX >> 2, rates, witness, &scale, accuracy, &mut step_of_all, 0.1).unwrap();
-            let witness = |_: f64, _: &_, t1: f64, _: &_, within: &dyn Fn(f64) -> _| see(of_moving, t1, within);
+            let witness = |[_, t1]: [f64; 2], _: &dyn Fn() -> _, within: &dyn Fn(f64) -> _| see(of_moving, t1, within);
             moving.advance(moves, rates, witness, &scale, accuracy, &mut step_of_moving, 0.1).unwrap();
         }
         assert_eq!((all, step_of_all, &instants[0]), (moving, step_of_moving, &instants[1]));

@@ -523,10 +523,19 @@ impl System for PneumaticMuscle {
         felt(memory, step, after, |inputs| &mut inputs.command)
     }
 
-    fn witness(memory: &mut PlantMemory, parameters: &Parameters, times: [f64; 2], [before, now]: [&Self::State; 2]) {
+    #[inline]
+    fn witness(
+        memory: &mut PlantMemory,
+        parameters: &Parameters,
+        times: [f64; 2],
+        states: &dyn Fn() -> [Self::State; 2],
+    ) {
+        if memory.contraction().is_empty() {
+            return;
+        }
+        let [before, now] = states();
         let (contractions, velocities) = ([before.0[1], now.0[1]], [before.0[2], now.0[2]]);
         match parameters.effects.contraction_filter() {
-            _ if memory.contraction().is_empty() => {}
             0.0 => memory.contraction().push_cubic(times, contractions, velocities),
             constant => memory.contraction().push_filtered(times, contractions, velocities, constant),
         }

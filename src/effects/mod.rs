@@ -416,7 +416,7 @@ macro_rules! effects {
             /// Whether no effect is at work.
             #[inline]
             pub fn are_neutral(&self) -> bool {
-                true $(&& self.$field.is_neutral())*
+                true $(&& (self.is_left_out(Place::$Effect) || self.$field.is_neutral()))*
             }
 
             /// Whether the values of the effect with this name are such as its cause can have.
@@ -477,7 +477,7 @@ macro_rules! effects {
             pub fn moving(&self) -> u64 {
                 let (mut moving, mut position) = (0, 0);
                 $(
-                    if !$Effect::STATE_SCALES.is_empty() && !self.$field.rests() {
+                    if !$Effect::STATE_SCALES.is_empty() && !self.is_left_out(Place::$Effect) && !self.$field.rests() {
                         moving |= ((1 << $Effect::STATE_SCALES.len()) - 1) << position;
                     }
                     position += $Effect::STATE_SCALES.len();
