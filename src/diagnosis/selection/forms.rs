@@ -81,7 +81,8 @@ impl Search<'_> {
         let says_all = |best: &&Judged| is_possible(best) && !is_unsound(&best.fitted.losses, &self.bench.data);
         best.filter(says_all).is_some_and(|best| {
             let before = beyond_noise(&self.baseline.losses);
-            let may_be_simpler = other.fitted.hypothesis.size() < best.fitted.hypothesis.size();
+            let [best, rival] = [best, other].map(|judged| &judged.fitted.hypothesis);
+            let may_be_simpler = best.parts.len() == 1 && rival.size() < best.size();
             !leaves_at_most(&other.fitted.losses, |signal| {
                 let of_form = if may_be_simpler { left_by_form(before[&signal]) } else { 0.0 };
                 OUT_OF_REACH * left_by_structure(signal, &self.bench.data).max(of_form)

@@ -133,7 +133,8 @@ impl Search<'_> {
     }
 
     /// Drops effects that a hypothesis of several can spare and be possible, the most superfluous first: fitted anew without it or, where
-    /// that goes where the others cannot be, as these are beside it.
+    /// that goes where the others cannot be, as these are beside it. What is left without it may be the others' form, which fits of these alone
+    /// may have missed from where they began.
     fn pruned(&self, judged: Judged) -> Judged {
         let parts = judged.fitted.hypothesis.parts.clone();
         if parts.len() < 2 {
@@ -141,7 +142,8 @@ impl Search<'_> {
         }
         let fewer = parts.par_iter().filter_map(|part| {
             let as_it_is = || self.bench.neutralised(&judged.fitted, part.effect).map(|fitted| self.judge(fitted));
-            self.without(&judged, part).filter(is_possible).or_else(as_it_is).filter(is_possible)
+            let fewer = self.without(&judged, part).filter(is_possible).or_else(as_it_is).filter(is_possible)?;
+            Some(if self.may_be_form(&fewer.fitted.losses) { self.in_best_form(fewer, None) } else { fewer })
         });
         match fewer.max_by(|a, b| a.score.total_cmp(&b.score)) {
             Some(fewer) if !self.is_worth(&fewer, &judged) => self.pruned(fewer),
