@@ -143,7 +143,8 @@ impl Search<'_> {
         let fewer = parts.par_iter().filter_map(|part| {
             let as_it_is = || self.bench.neutralised(&judged.fitted, part.effect).map(|fitted| self.judge(fitted));
             let fewer = self.without(&judged, part).filter(is_possible).or_else(as_it_is).filter(is_possible)?;
-            Some(if self.may_be_form(&fewer.fitted.losses) { self.in_best_form(fewer, None) } else { fewer })
+            let in_best_form = self.may_be_form(&fewer.fitted.losses).then(|| self.in_best_form(fewer.clone(), None));
+            Some(in_best_form.filter(is_possible).unwrap_or(fewer))
         });
         match fewer.max_by(|a, b| a.score.total_cmp(&b.score)) {
             Some(fewer) if !self.is_worth(&fewer, &judged) => self.pruned(fewer),
