@@ -106,14 +106,11 @@ impl<'r> Taken<'r> {
         first.searched(MOST_EFFECTS, fitting).ok_or_else(|| residuals::cannot_follow(&self.recordings))
     }
 
-    /// The same after something was found in another way. Two causes that were found where the coefficients may be off most, and are two here,
-    /// too, are what there is: to look for all others again takes minutes.
+    /// The same after something was found in another way. Two causes that are two here, too, where the coefficients may be off most, are what there
+    /// is: to look for all others again takes minutes.
     fn searched_again<'a>(&'a self, found: &Found<'a>, fitting: &'a Fitting<'a>) -> Result<Found<'a>> {
-        let again = if found.names_two_in_wide_way() {
-            self.wide_way()?.searched_from_two(&found.chosen.best, fitting)
-        } else {
-            None
-        };
+        let again =
+            if found.named() == 2 { self.wide_way()?.searched_from_two(&found.chosen.best, fitting) } else { None };
         again.map_or_else(|| self.searched(fitting), Ok)
     }
 }
@@ -133,7 +130,7 @@ pub fn better<'a>(taken: &'a [Taken<'a>], fitting: &'a Fitting<'a>) -> Result<(F
     // A model that cannot be simulated at all is the user's to mend.
     let mut data = taken.iter().map(Taken::data).collect::<Result<Vec<_>>>()?;
     if taken.len() == 1 {
-        return Ok((lines.searched(fitting)?, data.remove(0)));
+        return Ok((lines.searched(fitting)?.beside_rivals(), data.remove(0)));
     }
     let first = lines.first_way()?;
     let benches = taken[1..].iter().map(|other| other.bench(first.bench().off)).collect::<Result<_>>()?;
@@ -152,7 +149,7 @@ pub fn better<'a>(taken: &'a [Taken<'a>], fitting: &'a Fitting<'a>) -> Result<(F
         Some(other) => (other, taken[other].searched_again(&found, fitting)?),
         None => (way, found),
     };
-    Ok((found, compared.data.swap_remove(way)))
+    Ok((found.beside_rivals(), compared.data.swap_remove(way)))
 }
 
 /// Recordings as they were taken in all ways, straight lines first.

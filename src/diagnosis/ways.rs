@@ -131,6 +131,9 @@ impl<'a> Begun<'a> {
             }
         }
         let Some(mut found) = Found::of(narrow, most.min(AT_FIRST)) else { return Ok(None) };
+        if found.named() > 1 {
+            wide.knows_of(&found.chosen.best);
+        }
         let Some(mut other) = Found::of(wide, found.most_beside().min(AT_FIRST)) else { return Ok(None) };
         // Where another cause leads than was found, as many may be others.
         if other.search.leads_away_from(&found.chosen.best.hypothesis) {
@@ -178,9 +181,15 @@ impl<'a> Found<'a> {
         &self.search.bench
     }
 
-    /// Whether it names two causes where the coefficients may be off in the way that allows most.
-    pub fn names_two_in_wide_way(&self) -> bool {
-        self.search.allows_most() && self.chosen.names_causes() && self.chosen.best.hypothesis.parts.len() == 2
+    /// How many causes it names.
+    pub fn named(&self) -> usize {
+        if self.chosen.names_causes() { self.chosen.best.hypothesis.parts.len() } else { 0 }
+    }
+
+    /// With what may rival several causes in its best form, and the choice anew: where to look and how many causes there are does not hang on that.
+    pub fn beside_rivals(mut self) -> Self {
+        self.chosen = self.search.with_rivals().unwrap_or(self.chosen);
+        self
     }
 
     /// Whether one cause or none leaves no more than a sound model may.
