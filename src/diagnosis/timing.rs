@@ -110,7 +110,7 @@ impl<'r> Taken<'r> {
     /// is: to look for all others again takes minutes.
     fn searched_again<'a>(&'a self, found: &Found<'a>, fitting: &'a Fitting<'a>) -> Result<Found<'a>> {
         let again =
-            if found.named() == 2 { self.wide_way()?.searched_from_two(&found.chosen.best, fitting) } else { None };
+            if found.names_two() { self.wide_way()?.searched_from_two(&found.chosen.best, fitting) } else { None };
         again.map_or_else(|| self.searched(fitting), Ok)
     }
 }

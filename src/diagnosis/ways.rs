@@ -131,9 +131,6 @@ impl<'a> Begun<'a> {
             }
         }
         let Some(mut found) = Found::of(narrow, most.min(AT_FIRST)) else { return Ok(None) };
-        if found.named() > 1 {
-            wide.knows_of(&found.chosen.best);
-        }
         let Some(mut other) = Found::of(wide, found.most_beside().min(AT_FIRST)) else { return Ok(None) };
         // Where another cause leads than was found, as many may be others.
         if other.search.leads_away_from(&found.chosen.best.hypothesis) {
@@ -181,9 +178,9 @@ impl<'a> Found<'a> {
         &self.search.bench
     }
 
-    /// How many causes it names.
-    pub fn named(&self) -> usize {
-        if self.chosen.names_causes() { self.chosen.best.hypothesis.parts.len() } else { 0 }
+    /// Whether it names two causes.
+    pub fn names_two(&self) -> bool {
+        self.chosen.names_causes() && self.chosen.best.hypothesis.parts.len() == 2
     }
 
     /// With what may rival several causes in its best form, and the choice anew: where to look and how many causes there are does not hang on that.

@@ -34,7 +34,7 @@ impl Search<'_> {
         let explains = best.explained > LEAST_EXPLAINED.0;
         let is_close = |(rank, judged): &(usize, Judged)| {
             let may_be = rivals.contains(rank) || !may_be_form && ranks.contains(rank) || leads == Some(*rank);
-            may_be && !self.is_out_of_reach(Some(&best), judged) && !self.is_far_behind_two(judged)
+            may_be && !self.is_out_of_reach(Some(&best), judged)
         };
         let (close, rest): (Vec<_>, Vec<_>) = others.partition(is_close);
         let rest: Vec<Judged> = rest.into_iter().map(|(_, judged)| judged).collect();
@@ -87,16 +87,6 @@ impl Search<'_> {
                 let of_form = if may_be_simpler { left_by_form(before[&signal]) } else { 0.0 };
                 OUT_OF_REACH * left_by_structure(signal, &self.bench.data).max(of_form)
             })
-        })
-    }
-
-    /// Whether a single effect leaves so much more than two that are known to be enough that no form of it comes near.
-    fn is_far_behind_two(&self, single: &Judged) -> bool {
-        let two = self.enough.as_ref().filter(|_| single.fitted.hypothesis.parts.len() == 1);
-        two.is_some_and(|two| {
-            let left = beyond_noise(&two.fitted.losses);
-            let least = |signal| left_by_structure(signal, &self.bench.data).max(left[&signal]);
-            !leaves_at_most(&single.fitted.losses, |signal| OUT_OF_REACH * least(signal))
         })
     }
 

@@ -113,10 +113,6 @@ pub struct Search<'a> {
     from: Vec<(Part, usize)>,
     /// The best cause that is in no library.
     unlisted: Option<Judged>,
-    /// Two effects that leave no more than forms may, where such are known before single ones are refined.
-    enough: Option<Judged>,
-    /// The single effect that looks best in its best form, and fits of one more beside it, until these are looked into.
-    beside_best: Option<(Judged, Vec<Judged>)>,
     /// Whether hypotheses of several effects that may rival the one that leads are in their best form.
     has_rivals: bool,
 }
@@ -137,8 +133,6 @@ impl<'a> Search<'a> {
             unfitted: Vec::new(),
             from: Vec::new(),
             unlisted: None,
-            enough: None,
-            beside_best: None,
             has_rivals: false,
         };
         let starts = search.starts();
@@ -197,45 +191,17 @@ impl<'a> Search<'a> {
         leading.map(|leading| leading.fitted.clone())
     }
 
-    /// Refines the single effects, where at most so many are looked for at once. Where two are known to leave no more than forms may, those
-    /// that leave so much that no form of theirs comes near are no rivals.
-    fn refine(&mut self, most: usize) {
+    /// Refines the single effects.
+    fn refine(&mut self) {
         if self.is_refined {
             return;
         }
         self.complete();
-        if self.may_show() && !self.levels[0].is_empty() {
-            let singles = std::mem::take(&mut self.levels[0]);
-            let best = self.best_single.take().unwrap_or_else(|| self.in_best_form(singles[0].clone(), None));
-            if most > 1 && self.asks_for_two(&best) {
-                let beside = self.extend(&best.fitted, true, &self.from);
-                let two = beside.first().map(|two| self.finished(two.clone()));
-                self.enough =
-                    self.enough.take().or(two.filter(|two| self.are_enough(two) && self.is_worth(&best, two)));
-                self.beside_best = Some((best.clone(), beside));
-            }
-            self.levels[0] = self.refined_best(singles, Some(best));
+        if self.may_show() {
+            let (singles, best) = (std::mem::take(&mut self.levels[0]), self.best_single.take());
+            self.levels[0] = self.refined_best(singles, best);
         }
         self.is_refined = true;
-    }
-
-    /// Takes note of several effects that were found elsewhere, if they leave no more than forms may here, too.
-    pub fn knows_of(&mut self, found: &Fitted) {
-        let here = self.bench.exact_fit(&found.hypothesis, &found.parameters, Scope::All);
-        self.enough = here.map(|here| self.judge(here)).filter(|here| self.are_enough(here));
-    }
-
-    /// Whether the single effect that looks best leaves so much that two will be looked for.
-    fn asks_for_two(&self, best: &Judged) -> bool {
-        is_possible(best)
-            && self.leads(best)
-            && !self.may_be_form(&best.fitted.losses)
-            && self.unlisted_instead_of(Some(best)).is_none()
-    }
-
-    /// Whether effects can be as they are and leave no more than forms may.
-    fn are_enough(&self, judged: &Judged) -> bool {
-        is_possible(judged) && self.may_be_form(&judged.fitted.losses)
     }
 
     /// Whether another effect than those that were found elsewhere does best alone, by what an effect must have.
@@ -258,7 +224,7 @@ impl<'a> Search<'a> {
 
     /// Looks for at most so many effects at once, as long as one more is worth it, and chooses; `None` where a model cannot be simulated.
     pub fn up_to(&mut self, most: usize) -> Option<Chosen> {
-        self.refine(most);
+        self.refine();
         while self.goes_on(most) {
             let next = self.next_level(self.levels.last()?);
             self.levels.push(next);
@@ -408,29 +374,33 @@ impl<'a> Search<'a> {
     /// The most promising hypotheses with one effect more than those of a level, the best first.
     fn next_level(&self, level: &[Judged]) -> Vec<Judged> {
         let bases = carried_on(level);
-        // What forms may leave is looked into where the best leaves it first.
+        let (first, others) = bases.split_at(bases.len().min(1));
+        let mut more = self.beside(level, first);
+        // What forms may leave is looked into where the best leaves it first; and beside what looks worse alone where two are not enough there.
         let is_form_alone = level.first().is_some_and(|best| self.may_be_form(&best.fitted.losses));
-        let (first, others) = if is_form_alone || self.two_are_enough_beside(level) {
-            (&bases[..1], bases[1..].to_vec())
+        let is_best_first = is_form_alone || self.are_enough(level, &more);
+        let others = if is_best_first {
+            others.to_vec()
         } else {
-            (&bases[..], not_carried_on(level, &bases))
+            more.extend(self.beside(level, others));
+            not_carried_on(level, &bases)
         };
-        let mut next = self.extended(level, first);
+        let mut next = self.worth_refining(level, more);
         let is_missed =
-            if first.len() == 1 { !next.iter().any(|more| self.is_worth_more(level, more)) } else { next.is_empty() };
+            if is_best_first { !next.iter().any(|more| self.is_worth_more(level, more)) } else { next.is_empty() };
         if is_missed && effects_of(level) == 1 {
-            next.extend(self.extended(level, &others));
+            next.extend(self.worth_refining(level, self.beside(level, &others)));
             next = each_once(next);
         }
         self.with_exchanged(level, next)
     }
 
-    /// Whether one effect more beside the best of a level is known to leave no more than forms may.
-    fn two_are_enough_beside(&self, level: &[Judged]) -> bool {
-        let has_all =
-            |two: &Judged, of: &Judged| of.fitted.hypothesis.names().iter().all(|name| two.fitted.hypothesis.has(name));
-        let two = self.enough.as_ref().zip(level.first());
-        two.is_some_and(|(two, best)| effects_of(level) == 1 && has_all(two, best) && self.is_worth(best, two))
+    /// Whether of fits with two effects the best, fitted to the end, can be, is worth more than one, and leaves no more than forms may.
+    fn are_enough(&self, level: &[Judged], two: &[Judged]) -> bool {
+        let two = two.first().filter(|_| effects_of(level) == 1).map(|two| self.finished(two.clone()));
+        two.is_some_and(|two| {
+            is_possible(&two) && self.may_be_form(&two.fitted.losses) && self.is_worth_more(level, &two)
+        })
     }
 
     /// Hypotheses with one effect more than those of a level, and those with effects of the best, and of the best that can be, exchanged for others
@@ -449,17 +419,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The hypotheses of some ranks of a level with one effect more, as far as they may be worth it.
-    fn extended(&self, level: &[Judged], ranks: &[usize]) -> Vec<Judged> {
-        let more = ranks.iter().flat_map(|&rank| self.beside(&level[rank], rank == 0));
-        self.worth_refining(level, more.collect())
-    }
-
-    /// A hypothesis with one effect more each.
-    fn beside(&self, base: &Judged, leads: bool) -> Vec<Judged> {
-        let known =
-            self.beside_best.as_ref().filter(|(best, _)| leads && best.fitted.parameters == base.fitted.parameters);
-        known.map_or_else(|| self.extend(&base.fitted, leads, &self.from), |(_, known)| known.clone())
+    /// The hypotheses of some ranks of a level with one effect more each, the best of each rank first.
+    fn beside(&self, level: &[Judged], ranks: &[usize]) -> Vec<Judged> {
+        ranks.iter().flat_map(|&rank| self.extend(&level[rank].fitted, rank == 0, &self.from)).collect()
     }
 
     /// Hypotheses with effects of the best exchanged for others, those that are `known` to be as good in another form left out.
