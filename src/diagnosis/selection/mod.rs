@@ -113,8 +113,8 @@ pub struct Search<'a> {
     from: Vec<(Part, usize)>,
     /// The best cause that is in no library.
     unlisted: Option<Judged>,
-    /// Whether hypotheses of several effects that may rival the one that leads are in their best form.
-    has_rivals: bool,
+    /// Whether what may rival several effects that lead is looked into, or need not be.
+    is_done_with_rivals: bool,
 }
 
 impl<'a> Search<'a> {
@@ -133,7 +133,7 @@ impl<'a> Search<'a> {
             unfitted: Vec::new(),
             from: Vec::new(),
             unlisted: None,
-            has_rivals: false,
+            is_done_with_rivals: false,
         };
         let starts = search.starts();
         search.from = best_of_each(&starts);
@@ -243,11 +243,11 @@ impl<'a> Search<'a> {
         Some(())
     }
 
-    /// Chooses anew, with those hypotheses in their best form that may rival several effects that lead; `None` where that has been done or
-    /// where there are none.
+    /// Chooses anew, with those hypotheses in their best form that may rival several effects that lead; `None` where no such lead, or that is done
+    /// or need not be.
     pub fn with_rivals(&mut self) -> Option<Chosen> {
         let effects = self.leading()?.fitted.hypothesis.parts.len();
-        if effects < 2 || std::mem::replace(&mut self.has_rivals, true) {
+        if effects < 2 || std::mem::replace(&mut self.is_done_with_rivals, true) {
             return None;
         }
         let level = self.levels.iter().position(|level| effects_of(level) == effects)?;

@@ -35,7 +35,7 @@ impl Search<'_> {
         let both = both.into_par_iter().map(|both| self.finished(both)).collect();
         let both = first_of_each(sorted(both).into_iter());
         let best = possible(&both).filter(|both| leaves_nothing(both))?.clone();
-        self.has_rivals = true; // what is found so has none
+        self.is_done_with_rivals = true; // two in plain forms have none
         self.levels.truncate(1);
         self.levels.push(both);
         self.chosen(best).filter(|chosen| chosen.best.hypothesis.parts.len() == 2)
