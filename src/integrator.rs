@@ -64,6 +64,15 @@ const D: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
+/// Derivatives at the present state, per second, from the call before.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Now<S> {
+    /// Whether they are known.
+    pub is_known: bool,
+    /// The derivatives.
+    pub rates: S,
+}
+
 /// Integration left the range of numbers, no step was small enough, or there were too many.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Failed {
@@ -77,12 +86,14 @@ pub struct Failed {
 ///
 /// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness([t0, t1], ends, y)` is
 /// told of every accepted step, with the states `ends()` at both ends and the solution `y(t)` within it; `scale` is the usual size of each state, and
-/// `accuracy` the error of one step relative to it, and how many may be made; `step` is the step proposed by the last call and is updated.
+/// `accuracy` the error of one step relative to it, and how many may be made; `step` is the step proposed by the last call and is updated;
+/// `now` is updated, too.
 ///
 /// # Errors
 /// [`Failed`] when a state is not finite, the step would fall below a nanosecond, or the steps are too many; `state` is
 /// then meaningless.
 #[inline]
+#[allow(clippy::too_many_arguments)]
 pub fn advance<const N: usize>(
     mut rates: impl FnMut(f64, &[f64; N], &mut [f64; N]),
     mut witness: impl FnMut([f64; 2], &dyn Fn() -> [[f64; N]; 2], &dyn Fn(f64) -> [f64; N]),
@@ -90,11 +101,16 @@ pub fn advance<const N: usize>(
     accuracy: Accuracy,
     state: &mut [f64; N],
     step: &mut f64,
+    now: &mut Now<[f64; N]>,
     duration: f64,
 ) -> Result<(), Failed> {
     let mut time = 0.0;
     let mut stages = [[0.0; N]; 7];
-    rates(0.0, state, &mut stages[0]);
+    if std::mem::take(&mut now.is_known) {
+        stages[0] = now.rates;
+    } else {
+        rates(0.0, state, &mut stages[0]);
+    }
     for _ in 0..accuracy.most_steps_over(duration) {
         let rest = duration - time;
         // A rest that is hardly longer than the step is done in one, not in one and a sliver.
@@ -117,6 +133,7 @@ pub fn advance<const N: usize>(
             *step = step.max((h * growth(error)).min(LARGEST_STEP));
         }
         if error <= 1.0 && last {
+            *now = Now { is_known: true, rates: stages[0] };
             return Ok(());
         }
         if *step < SMALLEST_STEP {
@@ -221,14 +238,18 @@ mod tests {
     #[test]
     fn closed_form_is_met_whatever_the_calls() {
         for call in [1e-4, 1e-3, 1e-2, 0.25, 1.0] {
-            let (mut state, mut step) = ([1.0, 0.0, 1.0], 1e-3);
+            let (mut state, mut step, mut now) = ([1.0, 0.0, 1.0], 1e-3, Now::default());
             for _ in 0..(1.0_f64 / call).round() as usize {
-                advance(rates, |_, _, _| {}, &[1.0, 10.0, 1.0], Accuracy::USUAL, &mut state, &mut step, call).unwrap();
+                let scale = &[1.0, 10.0, 1.0];
+                advance(rates, |_, _, _| {}, scale, Accuracy::USUAL, &mut state, &mut step, &mut now, call).unwrap();
             }
             let exact = [10.0_f64.cos(), -10.0 * 10.0_f64.sin(), (-3.0_f64).exp()];
             for (is, should) in state.iter().zip(exact) {
                 assert!((is - should).abs() < 1e-6, "{call}: {is} {should}");
             }
+            let mut anew = [0.0; 3];
+            rates(0.0, &state, &mut anew);
+            assert_eq!(now, Now { is_known: true, rates: anew });
         }
     }
 
@@ -250,6 +271,7 @@ mod tests {
                 Accuracy { tolerance: 1.0, ..Accuracy::USUAL },
                 &mut [1.0, 0.0, 1.0],
                 &mut h.clone(),
+                &mut Now::default(),
                 h,
             )
             .unwrap();
@@ -262,14 +284,19 @@ mod tests {
     #[test]
     fn an_explosion_is_reported_with_its_time() {
         let explode = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = y[0] * y[0];
-        let failed = advance(explode, |_, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, 2.0).unwrap_err();
+        let failed =
+            advance(explode, |_, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, &mut Now::default(), 2.0)
+                .unwrap_err();
         assert!((failed.after - 1.0).abs() < 1e-3, "1/(1 - t) ends at 1 s, not {}", failed.after);
     }
 
     #[test]
     fn a_stiffness_without_sense_ends() {
         let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e12 * y[0];
-        assert!(advance(stiff, |_, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, 1.0).is_err());
+        assert!(
+            advance(stiff, |_, _, _| {}, &[1.0], Accuracy::USUAL, &mut [1.0], &mut 1e-3, &mut Now::default(), 1.0)
+                .is_err()
+        );
     }
 
     #[test]
@@ -277,7 +304,7 @@ mod tests {
         let stiff = |_: f64, y: &[f64; 1], dy: &mut [f64; 1]| dy[0] = -1e6 * y[0];
         let within = |most_steps: f64| {
             let accuracy = Accuracy { most_steps, ..Accuracy::USUAL };
-            advance(stiff, |_, _, _| {}, &[1.0], accuracy, &mut [1.0], &mut 1e-6, 0.1)
+            advance(stiff, |_, _, _| {}, &[1.0], accuracy, &mut [1.0], &mut 1e-6, &mut Now::default(), 0.1)
         };
         // Stability allows steps of 3.3 µs.
         assert_eq!(within(1e6), Ok(()));

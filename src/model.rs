@@ -3,7 +3,7 @@
 //! A [`System`] is the equations; a [`Simulator`] integrates them; [`Model`] is the simulator without its type.
 
 use crate::effects::{Description, Effects};
-use crate::integrator::{self, Accuracy};
+use crate::integrator::{self, Accuracy, Now};
 use crate::memory::Memory;
 use crate::muscle::ForceModels;
 use crate::parameters::Parameters;
@@ -33,7 +33,7 @@ pub trait State: Copy + Send {
     /// As a slice that can be changed.
     fn as_mut_slice(&mut self) -> &mut [f64];
     /// See [`integrator::advance`]; of the states of effects only those move whose bits are set in `moving`, and the others rest: `rates` may
-    /// leave out theirs.
+    /// leave out theirs, and of `now` theirs may be anything.
     ///
     /// # Errors
     /// As [`integrator::advance`].
@@ -46,6 +46,7 @@ pub trait State: Copy + Send {
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
+        now: &mut Now<Self>,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed>;
 }
@@ -67,13 +68,14 @@ impl<const N: usize> State for [f64; N] {
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
+        now: &mut Now<Self>,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
         if N == 0 {
             witness([0.0, duration], &|| [Self::ZERO; 2], &|_| Self::ZERO);
             return Ok(());
         }
-        integrator::advance(rates, witness, scale, accuracy, self, step, duration)
+        integrator::advance(rates, witness, scale, accuracy, self, step, now, duration)
     }
 }
 
@@ -94,6 +96,7 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
+        now: &mut Now<Self>,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
         let resting = *self;
@@ -104,6 +107,7 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
         };
         // What rests is put there once.
         let (mut all, mut all_rates) = (resting, Self::ZERO);
+        let mut some_now = Now { is_known: now.is_known, rates: of(&now.rates) };
         let rates = |t: f64, some: &[f64; M], out: &mut [f64; M]| {
             put(some, &mut all);
             rates(t, &all, &mut all_rates);
@@ -113,8 +117,10 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
             witness(times, &|| ends().map(|some| with(&some)), &|t| with(&within(t)));
         };
         let mut some = of(self);
-        some.advance(0, rates, witness, &of(scale), accuracy, step, duration)?;
+        some.advance(0, rates, witness, &of(scale), accuracy, step, &mut some_now, duration)?;
         put(&some, self);
+        put(&some_now.rates, &mut now.rates);
+        now.is_known = true;
         Ok(())
     }
 
@@ -129,13 +135,14 @@ impl<const OWN: usize, const N: usize> Extended<OWN, N> {
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
+        now: &mut Now<Self>,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
         let of = |all: &Self| positions.map(|position| all.0[position]);
         let put = |some: &[f64; M], all: &mut Self| {
             positions.iter().zip(some).for_each(|(position, value)| all.0[*position] = *value);
         };
-        let arrived = self.advance_some(of, put, rates, witness, scale, accuracy, step, duration);
+        let arrived = self.advance_some(of, put, rates, witness, scale, accuracy, step, now, duration);
         let named = |failed: integrator::Failed| integrator::Failed {
             state: failed.state.map(|which| positions[which]),
             ..failed
@@ -161,6 +168,7 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         scale: &Self,
         accuracy: Accuracy,
         step: &mut f64,
+        now: &mut Now<Self>,
         duration: f64,
     ) -> std::result::Result<(), integrator::Failed> {
         const { assert!(FEW <= N && N <= u64::BITS as usize) };
@@ -168,13 +176,23 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         if moving == 0 {
             let of = |all: &Self| -> [f64; OWN] { std::array::from_fn(|k| all.0[k]) };
             let put = |own: &[f64; OWN], all: &mut Self| all.0[..OWN].copy_from_slice(own);
-            self.advance_some(of, put, rates, witness, scale, accuracy, step, duration)
+            self.advance_some(of, put, rates, witness, scale, accuracy, step, now, duration)
         } else if all_moving.count_ones() as usize <= VERY_FEW {
-            self.advance_at(positions::<VERY_FEW>(all_moving), rates, witness, scale, accuracy, step, duration)
+            self.advance_at(positions::<VERY_FEW>(all_moving), rates, witness, scale, accuracy, step, now, duration)
         } else if all_moving.count_ones() as usize <= FEW {
-            self.advance_at(positions::<FEW>(all_moving), rates, witness, scale, accuracy, step, duration)
+            self.advance_at(positions::<FEW>(all_moving), rates, witness, scale, accuracy, step, now, duration)
         } else {
-            self.advance_some(|all| all.0, |moved, all| all.0 = *moved, rates, witness, scale, accuracy, step, duration)
+            self.advance_some(
+                |all| all.0,
+                |moved, all| all.0 = *moved,
+                rates,
+                witness,
+                scale,
+                accuracy,
+                step,
+                now,
+                duration,
+            )
         }
     }
 }
@@ -414,6 +432,20 @@ fn exposed_name<S: System>(declaration: &'static Variable) -> &'static str {
     own.map_or(declaration.name, |group| &declaration.name[group.len() + 1..])
 }
 
+/// How the state moves at the end of a step, per second, and the inputs by which it does.
+#[derive(Debug, Clone, Copy)]
+pub struct Known<S: System> {
+    inputs: S::Inputs,
+    now: Now<S::State>,
+}
+
+impl<S: System> Known<S> {
+    /// Before the first step.
+    pub fn nothing() -> Self {
+        Self { inputs: S::Inputs::default(), now: Now { is_known: false, rates: S::State::ZERO } }
+    }
+}
+
 /// A system in the course of a simulation.
 #[derive(Debug, Clone)]
 pub struct Simulator<S: System> {
@@ -487,17 +519,24 @@ impl<S: System> Simulator<S> {
     /// # Errors
     /// [`Error::Diverged`], [`Error::TooManySteps`]; nothing has changed then.
     pub fn advance(&mut self, duration: f64) -> Result<()> {
-        self.advance_past(duration, &[], &mut |_| {})
+        self.advance_past(duration, &mut Known::nothing(), &[], &mut |_| {})
     }
 
-    /// The same, with the outputs at some instants, in s from now, on the way; they are sorted.
+    /// The same, with the outputs at some instants, in s from now, on the way; they are sorted. With `known` from the step before it need not
+    /// find out anew how the state moves at its start, where the parameters are the same.
     ///
     /// # Errors
     /// As [`Simulator::advance`].
-    pub fn advance_past(&mut self, duration: f64, instants: &[f64], see: &mut dyn FnMut(S::Outputs)) -> Result<()> {
+    pub fn advance_past(
+        &mut self,
+        duration: f64,
+        known: &mut Known<S>,
+        instants: &[f64],
+        see: &mut dyn FnMut(S::Outputs),
+    ) -> Result<()> {
         let mark = self.memory.mark(self.clock.time);
         let before = (self.state, self.step);
-        if let Err(error) = self.integrate(&before.0, duration, instants, see) {
+        if let Err(error) = self.integrate(&before.0, duration, known, instants, see) {
             (self.state, self.step) = before;
             self.memory.roll_back(mark);
             return Err(error);
@@ -514,6 +553,7 @@ impl<S: System> Simulator<S> {
         &mut self,
         from: &S::State,
         duration: f64,
+        known: &mut Known<S>,
         instants: &[f64],
         see: &mut dyn FnMut(S::Outputs),
     ) -> Result<()> {
@@ -542,8 +582,11 @@ impl<S: System> Simulator<S> {
                     see(S::outputs(parameters, clock, &inputs, &within(instant - after), memory));
                 }
             };
-            let passed = state.advance(extent.moving(), rates, witness, &S::SCALE, accuracy, step, span);
+            known.now.is_known &= known.inputs == felt;
+            let now = &mut known.now;
+            let passed = state.advance(extent.moving(), rates, witness, &S::SCALE, accuracy, step, now, span);
             passed.map_err(|failed| diverged::<S>(time + after, &failed))?;
+            known.inputs = felt.along(&felt_slopes, span);
             // On, even where a passage is shorter than rounding.
             after = if span < duration - after { (after + span).max(after.next_up()) } else { duration };
         }
@@ -788,6 +831,8 @@ mod tests {
         let start = Extended(std::array::from_fn(|k| 1.0 / (k + 1) as f64));
         let (mut all, mut moving) = (start, start);
         let (mut step_of_all, mut step_of_moving) = (1e-3, 1e-3);
+        let nothing = Now { is_known: false, rates: Extended::ZERO };
+        let (mut now_of_all, mut now_of_moving) = (nothing, nothing);
         let mut instants = [Vec::new(), Vec::new()];
         let accuracy = Accuracy { tolerance: 1e-8, ..Accuracy::USUAL };
         for _ in 0..20 {
@@ -797,11 +842,14 @@ mod tests {
                 seen.push(within(0.5 * t1).0);
             };
             let witness = |[_, t1]: [f64; 2], _: &dyn Fn() -> _, within: &dyn Fn(f64) -> _| see(of_all, t1, within);
-            all.advance(u64::MAX >> 2, rates, witness, &scale, accuracy, &mut step_of_all, 0.1).unwrap();
+            all.advance(u64::MAX >> 2, rates, witness, &scale, accuracy, &mut step_of_all, &mut now_of_all, 0.1)
+                .unwrap();
             let witness = |[_, t1]: [f64; 2], _: &dyn Fn() -> _, within: &dyn Fn(f64) -> _| see(of_moving, t1, within);
-            moving.advance(moves, rates, witness, &scale, accuracy, &mut step_of_moving, 0.1).unwrap();
+            moving
+                .advance(moves, rates, witness, &scale, accuracy, &mut step_of_moving, &mut now_of_moving, 0.1)
+                .unwrap();
         }
-        assert_eq!((all, step_of_all, &instants[0]), (moving, step_of_moving, &instants[1]));
+        assert_eq!((all, step_of_all, now_of_all, &instants[0]), (moving, step_of_moving, now_of_moving, &instants[1]));
         assert!(all.0[13] != start.0[13] && all.0[12] == start.0[12] && !instants[0].is_empty());
     }
 }

@@ -4,7 +4,7 @@ use crate::controller::PidFeedForward;
 use crate::effects::{Effects, Readings};
 use crate::integrator::Accuracy;
 use crate::measurement::{Recording, Signal};
-use crate::model::{Simulator, System};
+use crate::model::{Known, Simulator, System};
 use crate::parameters::Parameters;
 use crate::plant::{
     ActuatorInputs, ActuatorOutputs, MeasuredInputs, MuscleAlone, MuscleInputs, MuscleOutputs, PneumaticActuator,
@@ -290,24 +290,27 @@ fn follow<S: System>(
     }
     let mut replay = Replay { given: given.to_vec(), ..Replay::default() };
     let may_skip = pull.is_none() && !S::remembers_finely(parameters);
-    let mut k = 0;
+    let (mut k, mut known) = (0, Known::nothing());
     loop {
-        match pull {
-            None => simulator.inputs = inputs(k, 0.0),
-            Some(pull) => force = balance(&mut simulator, |force| inputs(k, force), pull, force),
+        if let Some(pull) = pull {
+            force = balance(&mut simulator, |force| inputs(k, force), pull, force);
         }
         replay.push(shown(&simulator.outputs()));
         if k + 1 == time.len() {
             return Ok(replay);
         }
         // While the inputs rest, the integration goes on over samples with steps as long as it likes.
-        let resting = (k + 1..time.len()).take_while(|&next| may_skip && inputs(next, 0.0) == simulator.inputs).count();
+        let here = inputs(k, 0.0);
+        let resting = (k + 1..time.len()).take_while(|&next| may_skip && inputs(next, 0.0) == here).count();
         let next = k + resting.max(1);
         let span = time[next] - time[k];
         let difference = arriving(next, force).along(&simulator.inputs, -1.0);
         simulator.slopes = S::Inputs::default().along(&difference, 1.0 / span);
         let between: Vec<f64> = time[k + 1..next].iter().map(|time_between| time_between - time[k]).collect();
-        simulator.advance_past(span, &between, &mut |outputs| replay.push(shown(&outputs)))?;
+        simulator.advance_past(span, &mut known, &between, &mut |outputs| replay.push(shown(&outputs)))?;
+        if inputs(next, force) != arriving(next, force) {
+            simulator.inputs = inputs(next, force);
+        }
         k = next;
     }
 }
