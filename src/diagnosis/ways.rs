@@ -148,13 +148,18 @@ impl<'a> Begun<'a> {
     }
 }
 
-/// Whether the single effect that looks best beats the one of a way that allows more, where that one leaves nothing, and neither does the
-/// better one; `None` where that is not so. Then several effects would hardly have the odds, and others alone need only be looked for in full
-/// where the better one was found.
+/// Whether the single cause that looks best beats the one of a way that allows more, where that one has a name and leaves nothing, and neither
+/// does the better one; `None` where that is not so. Then several effects would hardly have the odds, and others alone need only be looked for
+/// in full where the better one was found.
 fn wins_alone(narrow: &mut Search, wide: &mut Search) -> Option<bool> {
-    let (own, other) = (narrow.best_single()?, wide.best_single()?);
-    let [own, other] = [(&*narrow, &own), (&*wide, &other)].map(|(search, fitted)| Best { search, fitted });
-    let wins = other.says_all().then(|| own.beats(&other))?;
+    let (own, other) = (narrow.best_single(), wide.best_single()?);
+    let other = Best { search: wide, fitted: &other };
+    if other.is_unlisted() || !other.says_all() {
+        return None;
+    }
+    let Some(own) = &own else { return Some(false) };
+    let own = Best { search: narrow, fitted: own };
+    let wins = own.beats(&other);
     (!wins || own.says_all()).then_some(wins)
 }
 
