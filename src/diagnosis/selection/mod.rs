@@ -176,19 +176,19 @@ impl<'a> Search<'a> {
         self.levels[0] = all;
     }
 
-    /// The single effect that leads if only the one that looks best is refined; `None` where none has the odds, or a cause in no library has
-    /// them against it. The effects that promise less are not fitted for that.
+    /// The single effect that leads if only the one that looks best is refined, or a cause in no library that has the odds against it; `None`
+    /// where none has the odds. The effects that promise less are not fitted for that.
     pub fn best_single(&mut self) -> Option<Fitted> {
         let mut singles = self.levels[0].clone();
         if !self.is_refined {
-            let best = singles.first_mut()?;
-            *best = self.in_best_form(best.clone(), None);
-            self.best_single = Some(best.clone());
+            if let Some(best) = singles.first_mut() {
+                *best = self.in_best_form(best.clone(), None);
+                self.best_single = Some(best.clone());
+            }
             singles = sorted(singles);
         }
-        let leading =
-            possible(&singles).filter(|best| self.leads(best) && self.unlisted_instead_of(Some(best)).is_none());
-        leading.map(|leading| leading.fitted.clone())
+        let leading = possible(&singles).filter(|best| self.leads(best));
+        self.unlisted_instead_of(leading).or(leading).map(|leading| leading.fitted.clone())
     }
 
     /// Refines the single effects.
@@ -252,7 +252,15 @@ impl<'a> Search<'a> {
         }
         let level = self.levels.iter().position(|level| effects_of(level) == effects)?;
         let hypotheses = std::mem::take(&mut self.levels[level]);
-        self.levels[level] = self.rivals_in_best_form(hypotheses);
+        let was_best = possible(&hypotheses).cloned();
+        let mut hypotheses = self.rivals_in_best_form(hypotheses);
+        // What became the best by its form may lend that to what was.
+        if let (Some(was), Some(best)) = (was_best, possible(&hypotheses))
+            && !same_effects(&was, best)
+        {
+            hypotheses = self.with_exchanged(&self.levels[level - 1], hypotheses);
+        }
+        self.levels[level] = hypotheses;
         self.choose()
     }
 
