@@ -29,6 +29,9 @@ pub const INTEGRATION: Accuracy = Accuracy { tolerance: 1e-7, most_steps: 3e4 };
 /// Single effects with which both are tried before more are looked for.
 const TRIED: usize = 2;
 
+/// Effects of a valve that answers late: half a sampling interval is hardly to be told from them.
+const LATE: [&str; 2] = ["valve_dead_time", "valve_lag"];
+
 /// The recordings with as many samples as fits need.
 pub fn thinned(recordings: &[Recording]) -> Vec<Recording> {
     let period = recordings.iter().map(Recording::duration).sum::<f64>() / MANY_SAMPLES;
@@ -162,16 +165,19 @@ struct Compared<'a> {
 }
 
 impl Compared<'_> {
-    /// Which other way explains what the nominal model leaves far better, and so well that a dead time has not the odds against it.
+    /// Which other way explains what the nominal model leaves far better, and so well that no valve that is late by itself has the odds against it.
     fn needed_at_once(&self, way: &Way) -> Option<usize> {
         let (bench, baseline) = (way.bench(), way.baseline());
         let own = self.losses(0, 0, baseline)?;
         let (best, going) = self.far_better_again(&[own], [baseline].into_iter())?;
-        let dead_time = Effects::description("valve_dead_time")?;
-        let start = bench.starts(&bench.base(baseline), dead_time).into_iter().next()?;
-        let late = Hypothesis::default().with(start.part);
-        let late = self.losses(0, 0, &bench.exact_fit(&late, &start.parameters, Scope::All)?)?;
-        (odds(&going, &late, 1.0) <= LEAST_EVIDENCE).then_some(best)
+        let base = bench.base(baseline);
+        let mut late = LATE.into_iter().filter_map(|name| {
+            let start = bench.starts(&base, Effects::description(name)?).into_iter().next()?;
+            let late = Hypothesis::default().with(start.part);
+            let losses = self.losses(0, 0, &bench.exact_fit(&late, &start.parameters, Scope::All)?)?;
+            Some(odds(&going, &losses, late.size() as f64))
+        });
+        late.all(|odds| odds <= LEAST_EVIDENCE).then_some(best)
     }
 
     /// Which other way explains the data far better with one of the best single effects than these do.
