@@ -271,9 +271,11 @@ impl Compared<'_> {
     }
 }
 
-/// Whether a fit in another way explains the data far better than an own one.
+/// Whether a fit in another way explains the data far better than an own one. Where a jump may have come at any instant between two samples, what
+/// that may leave is no reason for another way: a few that came late by chance would be.
 fn is_far_better(own: &[Loss], other: &[Loss]) -> bool {
-    gain(own, other) > LEAST_EVIDENCE
+    let excused: Vec<Loss> = own.iter().map(|loss| Loss { excess: loss.doubtless, ..*loss }).collect();
+    gain(&excused, other) > LEAST_EVIDENCE
 }
 
 /// The one of several fits in other ways that explains most.
