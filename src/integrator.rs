@@ -87,7 +87,7 @@ pub struct Failed {
 /// `rates(t, y, dy)` gives the derivatives at `t` seconds after the start of the interval; `witness([t0, t1], ends, y)` is
 /// told of every accepted step, with the states `ends()` at both ends and the solution `y(t)` within it; `scale` is the usual size of each state, and
 /// `accuracy` the error of one step relative to it, and how many may be made; `step` is the step proposed by the last call and is updated;
-/// `now` is updated, too.
+/// `now` holds the derivatives at `state`, if they are known before, and in any case after.
 ///
 /// # Errors
 /// [`Failed`] when a state is not finite, the step would fall below a nanosecond, or the steps are too many; `state` is

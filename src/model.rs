@@ -182,17 +182,8 @@ impl<const OWN: usize, const N: usize> State for Extended<OWN, N> {
         } else if all_moving.count_ones() as usize <= FEW {
             self.advance_at(positions::<FEW>(all_moving), rates, witness, scale, accuracy, step, now, duration)
         } else {
-            self.advance_some(
-                |all| all.0,
-                |moved, all| all.0 = *moved,
-                rates,
-                witness,
-                scale,
-                accuracy,
-                step,
-                now,
-                duration,
-            )
+            let (of, put) = (|all: &Self| all.0, |moved: &[f64; N], all: &mut Self| all.0 = *moved);
+            self.advance_some(of, put, rates, witness, scale, accuracy, step, now, duration)
         }
     }
 }
@@ -539,6 +530,7 @@ impl<S: System> Simulator<S> {
         if let Err(error) = self.integrate(&before.0, duration, known, instants, see) {
             (self.state, self.step) = before;
             self.memory.roll_back(mark);
+            *known = Known::nothing(); // it may be of a passage on the way
             return Err(error);
         }
         self.inputs = self.inputs.along(&self.slopes, duration);
