@@ -151,8 +151,8 @@ impl Recording {
                 }
             }
             check_time(path, line, signals.get(&Time))?;
-            check_mass(path, line, signals.get(&LoadMass))?;
         }
+        check_mass(path, &lines, signals.get(&LoadMass))?;
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let time = signals.remove(&Time).unwrap_or_default();
         let units = columns.iter().flatten().map(|column| (column.signal, column.unit)).collect();
@@ -291,13 +291,15 @@ impl Recording {
     /// The recording with about one sample per `period` in s, as far as there are as many and at least a thousand remain.
     /// Samples are left out; the command is a weighted mean, its weight falling to zero at the next sample that stays, so that
     /// a step between two of them keeps its time; of a command that is held, the mean until then. Where it jumps far at a sample, that one
-    /// stays, and no mean reaches over the jump.
+    /// stays, and no mean reaches over the jump. So does the first of the samples left out that shows a signal which the one that stays does not.
     pub fn thinned(&self, period: f64) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let every = ((period / self.period()).round() as usize).min(self.time.len() / THINNED_SAMPLES).max(1);
         let command = self.bridged(Command).filter(|_| self.between != Between::Lines);
         let jumps = command.map(|command| self.far_jumps(&command)).unwrap_or_default();
-        let kept: Vec<usize> = (0..self.time.len()).filter(|k| k % every == 0 || jumps.contains(k)).collect();
+        let alone = self.alone(every);
+        let stays = |k: &usize| k % every == 0 || jumps.contains(k) || alone.contains(k);
+        let kept: Vec<usize> = (0..self.time.len()).filter(stays).collect();
         let picked = |values: &[f64]| kept.iter().map(|k| values[*k]).collect();
         let weights = |position: usize| -> Vec<(usize, f64)> {
             let centre = kept[position];
@@ -329,6 +331,24 @@ impl Recording {
             every: self.every * every,
             ..self.clone()
         }
+    }
+
+    /// Of every so many samples, for each signal that the first one misses the first that shows it.
+    fn alone(&self, every: usize) -> BTreeSet<usize> {
+        let firsts = (0..self.time.len()).step_by(every);
+        let shown =
+            |values: &[f64], first: usize| (first..values.len().min(first + every)).find(|k| !values[*k].is_nan());
+        firsts.flat_map(|first| self.signals.values().filter_map(move |values| shown(values, first))).collect()
+    }
+
+    /// The recording with an instant more in the middle between any two samples, where all signals are on straight lines, but for what changes at
+    /// the samples themselves.
+    pub(crate) fn straight(&self) -> Self {
+        let changes = self.own_changes();
+        self.with_middles(|signal, values, k| match signal {
+            Command if changes.contains(&(k + 1)) => values[k],
+            _ => 0.5 * (values[k] + values[k + 1]),
+        })
     }
 
     /// The recording with an instant more in the middle between any two samples, where each signal is on the cubic through the
@@ -642,19 +662,20 @@ fn check_time(path: &Path, line: u64, time: Option<&Vec<f64>>) -> Result<()> {
     }
 }
 
-fn check_mass(path: &Path, line: u64, masses: Option<&Vec<f64>>) -> Result<()> {
-    let fail = |problem: String| {
-        Err(Error::Csv { path: path.to_owned(), line, column: Some("load_mass".to_owned()), problem })
-    };
-    let Some([earlier @ .., last]) = masses.map(Vec::as_slice) else { return Ok(()) };
-    match earlier.iter().find(|mass| !mass.is_nan()) {
-        _ if last.is_nan() => Ok(()),
-        _ if *last <= 0.0 => fail(format!("{last} kg; a hanging load is heavier than nothing")),
-        Some(first) if first != last => {
-            fail(format!("the load changes from {first} kg to {last} kg: split the file into one recording per load"))
+fn check_mass(path: &Path, lines: &[u64], masses: Option<&Vec<f64>>) -> Result<()> {
+    let known = || lines.iter().zip(masses.into_iter().flatten()).filter(|(_, mass)| !mass.is_nan());
+    let Some((_, first)) = known().next() else { return Ok(()) };
+    let problem = |mass: f64| match mass {
+        _ if mass <= 0.0 => Some(format!("{mass} kg; a hanging load is heavier than nothing")),
+        _ if mass != *first => {
+            Some(format!("the load changes from {first} kg to {mass} kg: split the file into one recording per load"))
         }
-        _ => Ok(()),
-    }
+        _ => None,
+    };
+    let refused = known().find_map(|(line, mass)| Some((*line, problem(*mass)?)));
+    refused.map_or(Ok(()), |(line, problem)| {
+        Err(Error::Csv { path: path.to_owned(), line, column: Some("load_mass".to_owned()), problem })
+    })
 }
 
 fn csv_error(path: &Path, error: &csv::Error) -> Error {

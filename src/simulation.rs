@@ -204,7 +204,7 @@ impl<'a> Motion<'a> {
         let averaging = parameters.effects.contraction_averaging();
         let first = readings[0];
         let filter = parameters.effects.contraction_filter();
-        let late = parameters.effects.contraction_delay() + 0.5 * averaging + filter;
+        let late = parameters.effects.contraction_lateness();
         if late > 0.0 {
             readings = ahead(time, &readings, late);
         }

@@ -162,8 +162,9 @@ impl Motion {
 pub fn initial_motion(parameters: &Parameters, recording: &Recording) -> InitialMotion {
     let Some(Motion { contraction, velocity, .. }) = recording.motion() else { return InitialMotion::default() };
     let truth = |reading: f64| parameters.effects.true_contraction(reading, 0.0, 0.0);
-    let contraction_velocity = truth(contraction + velocity) - truth(contraction);
-    let contraction = truth(contraction) + parameters.effects.contraction_delay() * contraction_velocity;
+    // Of a thousandth of a second, in which no scale changes.
+    let contraction_velocity = 1e3 * (truth(contraction + 1e-3 * velocity) - truth(contraction));
+    let contraction = truth(contraction) + parameters.effects.contraction_lateness() * contraction_velocity;
     match hanging_contraction(parameters, 0.0) {
         Ok(hanging) if stretched_apart(parameters, contraction).is_none() => {
             InitialMotion { contraction_offset: contraction - hanging, contraction_velocity }

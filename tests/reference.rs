@@ -401,6 +401,14 @@ fn effects_agree_with_scipy() {
             ],
         ),
         (
+            "contact",
+            &[
+                ("threshold_pressure.contact", 0.4e5),
+                ("threshold_pressure.contact_exponent", 2.4),
+                ("threshold_pressure.decrease_with_contraction", 0.2),
+            ],
+        ),
+        (
             "friction",
             &[
                 ("friction_hysteresis.half_width", 12.0),

@@ -587,7 +587,7 @@ impl<'a> Bench<'a> {
         let priors = DMatrix::from_diagonal(&DVector::from_iterator(free.len(), priors));
         let inverse = (normal_matrix(&columns) + &priors).try_inverse()?;
         let scatter = &inverse * (self.gradients(&columns, &weighted(&fitted.residuals, &weights)) + priors) * &inverse;
-        let sampling = weighted(&self.data.sampling_error(&fitted.parameters, &fitted.residuals)?, &weights);
+        let sampling = weighted(&self.data.sampling_error(&fitted.parameters)?, &weights);
         let pull = columns.iter().map(|column| column.iter().zip(&sampling).map(|(slope, error)| slope * error).sum());
         let shift = inverse * DVector::from_iterator(free.len(), pull);
         let deviation = |k: usize| (scatter[(k, k)].max(0.0) + shift[k].powi(2)).sqrt() * free[k].typical;

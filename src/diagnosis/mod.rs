@@ -199,11 +199,13 @@ fn answer(
     }
     let between = data.recordings()[0].between();
     notes.extend(says_how_command_goes(between).map(str::to_owned));
+    let says_nothing = |name| format!("{name}: no output was measured that could be compared with the model");
+    notes.extend(data.not_compared().map(says_nothing));
     let nominal_residuals = data.residuals(nominal)?;
     let mut left = data.residuals(&chosen.model.parameters)?;
     data.refine_noise(&left);
     let seen = if chosen.saw_all { Scope::All } else { Scope::Training };
-    let (parameters, corrections) = bench.intervals(&chosen.model, seen);
+    let (parameters, mut corrections) = bench.intervals(&chosen.model, seen);
     notes.extend(of_several(chosen, data.recordings()));
     let nominal_errors = data.held_out_rms(&nominal_residuals);
     let mut extended = chosen.model.parameters;
@@ -211,6 +213,7 @@ fn answer(
     // Corrections that do not help on unseen samples are not made.
     if !chosen.names_causes() && data.weighted(&extended_errors) > data.weighted(&nominal_errors) {
         (extended, extended_errors, left) = (*nominal, nominal_errors.clone(), nominal_residuals);
+        corrections.clear();
     }
     let (before, after) = (data.weighted(&nominal_errors), data.weighted(&extended_errors));
     let signals = nominal_errors.iter().map(|(signal, nominal_rms)| SignalErrors {

@@ -177,6 +177,13 @@ impl<'a> Data<'a> {
         signals
     }
 
+    /// Names of the recordings of which nothing can be compared.
+    pub fn not_compared(&self) -> impl Iterator<Item = String> {
+        let is_compared = |recording: usize| self.segments.iter().any(|segment| segment.recording == recording);
+        let recordings = self.recordings.iter().enumerate();
+        recordings.filter(move |(number, _)| !is_compared(*number)).map(|(_, recording)| recording.name())
+    }
+
     /// Noise of a signal's sensor, SI.
     pub fn noise(&self, signal: Signal) -> Noise {
         self.noise[&signal]
@@ -211,12 +218,6 @@ impl<'a> Data<'a> {
         self.signals().into_iter().map(|signal| (signal, pooled(signal))).collect()
     }
 
-    /// Smallest span of a signal among the recordings, SI.
-    fn span(&self, signal: Signal) -> f64 {
-        let segments = self.segments.iter().filter(|segment| segment.signal == signal);
-        segments.map(|segment| span(self.measured(segment))).fold(f64::INFINITY, f64::min)
-    }
-
     /// Mean square of an error that is some share of the largest that a signal shows, relative to that of the noise.
     pub fn share_of_reading(&self, signal: Signal, share: f64) -> f64 {
         let of_signal = self.segments.iter().filter(|segment| segment.signal == signal);
@@ -230,9 +231,21 @@ impl<'a> Data<'a> {
         if signal == Signal::GaugePressure { 0.0 } else { self.share_of_span(signal) }
     }
 
-    /// Mean square of an error that is as large a share of the span of a signal, of whichever; relative to that of the noise.
+    /// The same in one recording.
+    fn structure_in(&self, segment: &Segment) -> f64 {
+        if segment.signal == Signal::GaugePressure { 0.0 } else { self.share_of_own_span(segment) }
+    }
+
+    /// Mean square of an error that is in each recording as large a share of the span of a signal, of whichever; relative to that of the noise.
     pub fn share_of_span(&self, signal: Signal) -> f64 {
-        (STRUCTURE_SHARE * self.tolerance * self.span(signal) / self.noise[&signal].level).powi(2)
+        let of_signal = || self.segments.iter().filter(|segment| segment.signal == signal);
+        let sum: f64 = of_signal().map(|s| s.samples.len() as f64 * self.share_of_own_span(s)).sum();
+        sum / of_signal().map(|segment| segment.samples.len() as f64).sum::<f64>()
+    }
+
+    fn share_of_own_span(&self, segment: &Segment) -> f64 {
+        let error = STRUCTURE_SHARE * self.tolerance * span(self.measured(segment));
+        (error / self.noise[&segment.signal].level).powi(2)
     }
 
     /// Takes what a better model shows of the noise, where that is less.
@@ -318,10 +331,16 @@ impl<'a> Data<'a> {
 
     /// By how much the residuals of a model change where inputs go along cubics between their samples instead of along straight
     /// lines: how they truly go nobody knows. `None` where the model cannot be simulated.
-    pub fn sampling_error(&self, parameters: &Parameters, residuals: &[f64]) -> Option<Vec<f64>> {
-        let doubled: Vec<Recording> = self.recordings.iter().map(Recording::doubled).collect();
-        let cubics = self.residuals_on(&doubled, 2, parameters)?;
-        Some(cubics.iter().zip(residuals).map(|(cubic, line)| cubic - line).collect())
+    pub fn sampling_error(&self, parameters: &Parameters) -> Option<Vec<f64>> {
+        // Both have as many instants, so that both begin alike.
+        let going = |doubled: fn(&Recording) -> Recording| {
+            let recordings: Vec<Recording> = self.recordings.iter().map(doubled).collect();
+            self.residuals_on(&recordings, 2, parameters)
+        };
+        let (cubics, lines) = (going(Recording::doubled)?, going(Recording::straight)?);
+        let mut error: Vec<f64> = cubics.iter().zip(lines).map(|(cubic, line)| cubic - line).collect();
+        self.whiten_all(&mut error);
+        Some(error)
     }
 
     /// Half of the difference that it makes to the residuals of a model whether jumps of the command come a quarter of a sampling interval
@@ -376,8 +395,8 @@ impl<'a> Data<'a> {
     /// Variance of sums of a segment's residuals relative to that of as many independent ones of the noise, where there is the structural
     /// error of a sound nominal model as well, one for each block.
     fn inflation_beside_structure(&self, segment: &Segment) -> f64 {
-        let per_block = BLOCK / self.recordings[segment.recording].period();
-        self.noise[&segment.signal].inflation + per_block * self.structure(segment.signal)
+        let per_block = (BLOCK / self.recordings[segment.recording].period()).max(1.0);
+        self.noise[&segment.signal].inflation + per_block * self.structure_in(segment)
     }
 
     fn weights_by(&self, scope: Scope, variance: impl Fn(&Segment, Noise) -> f64) -> Vec<f64> {
@@ -404,7 +423,7 @@ impl<'a> Data<'a> {
             };
             let (scaled, doubtless): (Vec<f64>, Vec<f64>) =
                 in_scope.map(|(_, at)| (residuals[at] / level, excused(at))).unzip();
-            let structure = self.structure(segment.signal);
+            let structure = self.structure_in(segment);
             (!scaled.is_empty()).then(|| Loss {
                 signal: segment.signal,
                 samples: scaled.len(),
@@ -521,7 +540,9 @@ impl<'a> Data<'a> {
             let segments = self.segments.iter().filter(|segment| segment.signal == signal);
             segments.map(|s| s.samples.iter().filter(|k| self.is_in(scope, s, **k)).count()).sum::<usize>()
         };
-        count(Scope::Training) >= FEWEST_SAMPLES / 2 && count(Scope::HeldOut) >= FEWEST_SAMPLES / 2
+        // As many as are held out of a recording that is just long enough.
+        let fewest = (1.0 - TRAINING_SHARE) * FEWEST_SAMPLES as f64;
+        [Scope::Training, Scope::HeldOut].into_iter().all(|scope| count(scope) as f64 >= fewest)
     }
 
     fn measured(&self, segment: &Segment) -> &[f64] {
@@ -574,9 +595,9 @@ fn segments(recordings: &[Recording], nominal: &Parameters, tolerance: f64) -> R
 struct GapDoubt {
     /// The last known samples before gaps.
     begins: BTreeSet<usize>,
-    /// Simulation with inputs on straight lines.
+    /// Simulation with inputs on straight lines, at twice as many instants.
     straight: Replay,
-    /// The same with inputs off them in the gaps, at twice as many instants.
+    /// The same with inputs off them in the gaps.
     bent: Replay,
 }
 
@@ -588,17 +609,20 @@ impl GapDoubt {
         let bent = replay(nominal, &recording.bent_in_gaps(longest)?).ok()?;
         let of_signal = |signal: &Signal| recording.gaps(*signal, longest).into_iter().map(|(from, _)| from);
         let begins = OUTPUTS.iter().chain([&Signal::Command]).flat_map(of_signal).collect();
-        Some(Self { begins, straight: replay(nominal, &recording).ok()?, bent })
+        Some(Self { begins, straight: replay(nominal, &recording.straight()).ok()?, bent })
     }
 
     /// Which samples of a signal may be off by more than what is the least that counts: from a gap on until it never is any more.
     fn doubted(&self, signal: Signal, least: f64) -> Vec<bool> {
-        let [straight, bent] = [&self.straight, &self.bent].map(|replay| replay.get(signal).unwrap_or_default());
+        let at_samples = |replay: &Replay| -> Vec<f64> {
+            replay.get(signal).unwrap_or_default().iter().step_by(2).copied().collect()
+        };
+        let (straight, bent) = (at_samples(&self.straight), at_samples(&self.bent));
         let mut doubted = vec![false; straight.len()];
         let mut is_doubted = false;
         for k in (self.begins.first().copied().unwrap_or(0)..straight.len()).rev() {
             is_doubted &= !self.begins.contains(&k);
-            is_doubted |= (bent[2 * k] - straight[k]).abs() > least;
+            is_doubted |= (bent[k] - straight[k]).abs() > least;
             doubted[k] = is_doubted;
         }
         doubted
@@ -640,7 +664,7 @@ fn effective_samples(series: &[f64], period: f64) -> f64 {
     let correlation = |lag: usize| series.iter().zip(&series[lag..]).map(|(a, b)| a * b).sum::<f64>() / power;
     let sum: f64 = (1..=longest).map(correlation).take_while(|rho| *rho > 0.0).sum();
     let samples = series.len() as f64;
-    (samples / (1.0 + 2.0 * sum)).max(samples * period / BLOCK)
+    (samples / (1.0 + 2.0 * sum)).max(samples * (period / BLOCK).min(1.0))
 }
 
 #[cfg(test)]

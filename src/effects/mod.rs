@@ -574,6 +574,12 @@ macro_rules! effects {
                 self.contraction_delay() + self.contraction_averaging()
             }
 
+            /// Time in s by which the position sensor is late where the contraction moves at a constant rate.
+            #[inline]
+            pub fn contraction_lateness(&self) -> f64 {
+                self.contraction_delay() + 0.5 * self.contraction_averaging() + self.contraction_filter()
+            }
+
             chained! { "Command in V on which the valve acts."; command; $($field: $Effect;)* }
             chained! { "Gauge pressure in Pa that the valve goes for."; target_pressure; $($field: $Effect;)* }
             chained! { "Rate of the gauge pressure in Pa/s."; pressure_rate; $($field: $Effect;)* }

@@ -10,7 +10,8 @@ crate::variables::variables! {
     /// The area feels p − (l₀ + l exp(−(p/f)ᵉ)) exp(−d x/0.1 m) (1 + w F/400 N), but nothing below zero: `lost` l, `exponent` e,
     /// `decrease_with_contraction` d, as a bladder comes to the braid while the muscle grows thick, `increase_with_pull` w of the static
     /// nominal pull F, as a stretched muscle is thin; f = `fade` (1 + v F/400 N), `wider_with_pull` v. `lasting` l₀ does not fade with
-    /// the pressure and, with an `onset` o, is l₀ (1 − exp(−p/o)).
+    /// the pressure and, with an `onset` o, is l₀ (1 − exp(−p/o)). Of a bladder that comes to the braid bit by bit p/(1 + (p/c)ⁿ) is lost as well:
+    /// at the pressure `contact` c half of it is there, the more suddenly the larger `contact_exponent` n.
     ///
     /// # In the data
     /// The force falls short at low pressure only, by the same in both directions; above a bar or two nothing is wrong.
@@ -39,6 +40,10 @@ crate::variables::variables! {
         lasting: f64 = 0.0, PASCAL, (0.0..=4e5);
         /// Pressure over which that sets in
         onset: f64 = 0.0, PASCAL, (0.0..=2e5);
+        /// Pressure at which half of a bladder is in contact with the braid that comes to it bit by bit
+        contact: f64 = 0.0, PASCAL, (0.0..=3e5);
+        /// How suddenly it comes into contact: 2 gradually
+        contact_exponent: f64 = 2.0, ONE, (1.2..=6.0);
     }
 }
 
@@ -50,7 +55,15 @@ impl ThresholdPressure {
         let set_in = if self.onset == 0.0 { 1.0 } else { 1.0 - (-pressure / self.onset).exp() };
         let relative = pressure / (self.fade * wider);
         let power = if self.exponent == 1.0 { relative } else { relative.powf(self.exponent) };
-        (self.lasting * set_in + self.lost * (-power).exp()) * more
+        (self.lasting * set_in + self.lost * (-power).exp() + self.out_of_contact(pressure)) * more
+    }
+
+    /// What is lost at a pressure in Pa as a part of the bladder is not in contact yet, Pa.
+    fn out_of_contact(&self, pressure: f64) -> f64 {
+        if self.contact == 0.0 {
+            return 0.0;
+        }
+        pressure / (1.0 + (pressure / self.contact).powf(self.contact_exponent))
     }
 
     /// Factors of the loss and of the pressure over which it fades at a pull in N.
@@ -68,7 +81,7 @@ impl Effect for ThresholdPressure {
     const DESCRIPTION: Description = Description {
         name: "threshold_pressure",
         meaning: "pressure lost before the muscle responds, which matters at low pressure",
-        equation: "p <- max(0, p - (l0 (1 - exp(-p/o)) + l exp(-(p/(f (1 + v F/400 N)))^e)) exp(-d x/0.1 m) (1 + w F/400 N))",
+        equation: "p <- max(0, p - (l0 (1 - exp(-p/o)) + l exp(-(p/(f (1 + v F/400 N)))^e) + p/(1 + (p/c)^n)) exp(-d x/0.1 m) (1 + w F/400 N))",
         signature: "force falls short at low pressure only, the same in both directions",
         experiment: "slow ramps of the pressure from zero at two lengths",
         reference: "Chou and Hannaford 1996",
@@ -93,6 +106,7 @@ impl Effect for ThresholdPressure {
                 ("threshold_pressure.exponent", &[1.5]),
                 ("threshold_pressure.wider_with_pull", &[0.5]),
             ],
+            &[("threshold_pressure.contact", &[0.3e5, 0.8e5]), ("threshold_pressure.contact_exponent", &[2.5])],
         ],
         refinements: &[
             ("threshold_pressure.exponent", &[1.5, 2.5]),
@@ -103,7 +117,7 @@ impl Effect for ThresholdPressure {
     };
 
     fn is_neutral(&self) -> bool {
-        self.lost == 0.0 && self.lasting == 0.0
+        self.lost == 0.0 && self.lasting == 0.0 && self.contact == 0.0
     }
 
     fn effective_pressure(&self, at: &Point, pull: &impl Fn() -> f64, pressure: f64) -> f64 {
@@ -118,7 +132,8 @@ impl Effect for ThresholdPressure {
     fn sentence(&self) -> String {
         let bar = |gauge_pressure: f64, pull: f64| 1e-5 * self.lost_at(gauge_pressure, &|| pull);
         let lasting = |pull: f64| 1e-5 * self.lasting * self.grown(&|| pull)[0];
-        let told = if self.lost == 0.0 {
+        let (fades, low) = (self.lost != 0.0 || self.contact != 0.0, self.contact);
+        let told = if !fades {
             let word = if self.decrease_with_contraction > 0.0 { "less" } else { "more" };
             let percent = 100.0 * (-self.decrease_with_contraction).exp_m1().abs();
             let then = if percent == 0.0 {
@@ -128,19 +143,20 @@ impl Effect for ThresholdPressure {
             };
             format!("The muscle responds late: {:.2} bar are lost before it does{then}", lasting(0.0))
         } else {
+            let at_low = if low == 0.0 { "at first".to_owned() } else { format!("at {:.2} bar", 1e-5 * low) };
             format!(
-                "At low pressure the muscle responds late: {:.2} bar are lost at first, {:.2} bar at 1 bar",
-                bar(0.0, 0.0),
+                "At low pressure the muscle responds late: {:.2} bar are lost {at_low}, {:.2} bar at 1 bar",
+                bar(low, 0.0),
                 bar(1e5, 0.0)
             )
         };
         if [self.increase_with_pull, self.wider_with_pull] == [0.0; 2] {
             return format!("{told}.");
         }
-        let pulled = if self.lost == 0.0 {
-            format!("{:.2} bar", lasting(REFERENCE_FORCE))
+        let pulled = if fades {
+            format!("{:.2} and {:.2} bar", bar(low, REFERENCE_FORCE), bar(1e5, REFERENCE_FORCE))
         } else {
-            format!("{:.2} and {:.2} bar", bar(0.0, REFERENCE_FORCE), bar(1e5, REFERENCE_FORCE))
+            format!("{:.2} bar", lasting(REFERENCE_FORCE))
         };
         format!("{told}; under a pull of {REFERENCE_FORCE:.0} N {pulled}.")
     }

@@ -1,8 +1,7 @@
 //! Sensors that do not follow what they measure, and columns that no sensor made.
 
 use super::{
-    asked_pressure, header, in_file_unit, is_measured, known_pressure, middle_span, present, quantile, rounded, span,
-    units,
+    asked_pressure, header, in_file_unit, is_measured, known_pressure, present, quantile, rounded, span, units,
 };
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
@@ -51,7 +50,7 @@ fn constant_command(recording: &Recording) -> Option<String> {
     let command = recording.get(Signal::Command)?;
     let level = quantile(command, 0.5)?;
     let text = "`command` is constant: of the valve nothing can be judged, only what drifts or is moved from outside";
-    (middle_span(command) <= REPEATABILITY * level.abs()).then(|| text.to_owned())
+    (span(command) <= REPEATABILITY * level.abs()).then(|| text.to_owned())
 }
 
 /// A column that always shows the same.

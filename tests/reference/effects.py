@@ -781,6 +781,11 @@ class Threshold(Plant):
         return super().static_force(pressure - lost * np.exp(-3 * x) * (1 + 0.2 * pull), x, own)
 
 
+class Contact(Plant):
+    def static_force(self, pressure, x, own):
+        return super().static_force(pressure - pressure / (1 + (pressure / 0.4e5) ** 2.4) * np.exp(-2 * x), x, own)
+
+
 class Friction(Plant):
     own_scales = 1.0, 1.0
 
@@ -912,6 +917,7 @@ CASES = [
     Case("wire", Wire(), THROWS),
     Case("laid_rope", LaidRope(), RAMPS),
     Case("threshold", Threshold(), STAIRS),
+    Case("contact", Contact(), STAIRS),
     Case("thinning_damping", ThinningDamping(), RAMPS),
     Case("friction", Friction(), RAMPS),
     Case("direct_friction", DirectFriction(), RAMPS),
