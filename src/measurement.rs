@@ -291,7 +291,7 @@ impl Recording {
     /// The recording with about one sample per `period` in s, as far as there are as many and at least a thousand remain.
     /// Samples are left out; the command is a weighted mean, its weight falling to zero at the next sample that stays, so that
     /// a step between two of them keeps its time; of a command that is held, the mean until then. Where it jumps far at a sample, that one
-    /// stays, and no mean reaches over the jump. So does the first of the samples left out that shows a signal which the one that stays does not.
+    /// stays, and no mean reaches over the jump. So do samples of a signal that is logged in rows of its own.
     pub fn thinned(&self, period: f64) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let every = ((period / self.period()).round() as usize).min(self.time.len() / THINNED_SAMPLES).max(1);
@@ -333,12 +333,16 @@ impl Recording {
         }
     }
 
-    /// Of every so many samples, for each signal that the first one misses the first that shows it.
+    /// Of every so many samples the first ones that show a signal which the first of them mostly does not: one that is logged in rows of its own.
     fn alone(&self, every: usize) -> BTreeSet<usize> {
-        let firsts = (0..self.time.len()).step_by(every);
-        let shown =
-            |values: &[f64], first: usize| (first..values.len().min(first + every)).find(|k| !values[*k].is_nan());
-        firsts.flat_map(|first| self.signals.values().filter_map(move |values| shown(values, first))).collect()
+        let cells = || (0..self.time.len()).step_by(every).map(|first| first..self.time.len().min(first + every));
+        let of_signal = |values: &Vec<f64>| {
+            let shown: Vec<usize> = cells().filter_map(|mut cell| cell.find(|k| !values[*k].is_nan())).collect();
+            let late = |k: &usize| k % every != 0;
+            let is_mostly_late = 2 * shown.iter().filter(|k| late(k)).count() > shown.len();
+            shown.into_iter().filter(move |k| is_mostly_late && late(k)).collect::<Vec<_>>()
+        };
+        self.signals.values().flat_map(of_signal).collect()
     }
 
     /// The recording with an instant more in the middle between any two samples, where all signals are on straight lines, but for what changes at
@@ -914,6 +918,20 @@ mod tests {
         assert_eq!(thinned.line(1), 6);
         assert_eq!(parse(&text).unwrap().thinned(1e-3).time.len(), 6000);
         assert_eq!(parse(&text).unwrap().thinned(1.0).time.len(), 1000);
+    }
+
+    #[test]
+    fn thinning_keeps_signals_that_are_logged_in_rows_of_their_own() {
+        // The contraction in every second row, the load in one.
+        let text: String =
+            (0..8000).fold("time [ms],command [V],contraction [m],load_mass [kg]\n".to_owned(), |text, k| {
+                let (command, contraction) = if k % 2 == 0 { ("1", "") } else { ("", "0.1") };
+                text + &format!("{k},{command},{contraction},{}\n", if k == 4001 { "20" } else { "" })
+            });
+        let thinned = parse(&text).unwrap().thinned(4e-3);
+        assert_eq!(thinned.time.len(), 4000);
+        assert_eq!(thinned.known(Contraction).len(), 2000);
+        assert_eq!(thinned.load_mass(), Some(20.0));
     }
 
     #[test]

@@ -114,6 +114,8 @@ fn a_contraction_that_is_a_length_is_noticed() {
 #[test]
 fn constant_columns_are_noticed() {
     assert_says(&note(spoilt(DRIVEN, "command", |_, _| 2.0)), &["`command` is constant"]);
+    let pulse = spoilt(DRIVEN, "command", |time, _| if (3.0..3.5).contains(&time) { 4.0 } else { 2.0 });
+    assert!(!found(&[pulse]).unwrap().iter().any(|note| note.contains("is constant")));
     assert_says(&note(spoilt(HANGING, "force", |_, _| 392.4)), &["`force` is 392.4 N throughout", "says nothing"]);
     let held = spoilt(DRIVEN, "contraction", |_, _| 80.0);
     assert!(found(&[held]).unwrap().iter().any(|note| note.contains("`contraction` is 80 mm throughout")));

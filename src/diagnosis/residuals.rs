@@ -694,5 +694,6 @@ mod tests {
         let blocks: Vec<f64> = (0..1000).map(|k| if k / 20 % 2 == 0 { 1.0 } else { -1.0 }).collect();
         let worth = effective_samples(&blocks, 0.01);
         assert!((30.0..200.0).contains(&worth), "{worth}");
+        assert_eq!(effective_samples(&blocks, 10.0), 1000.0, "none is worth more than itself");
     }
 }
