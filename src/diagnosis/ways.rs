@@ -47,19 +47,23 @@ impl<'a> Way<'a> {
 
     /// Looks for at most so many effects; `fitting` is told those of each fit. `None` where a model cannot be simulated.
     pub fn searched(self, most: usize, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
-        Found::of(self.looked_over(fitting), most).map(|found| found.or_two(None))
+        Found::of(self.looked_over(None, fitting), most).map(|found| found.or_two(None))
     }
 
     /// Two effects that were found elsewhere, or what is as good as they are, with what there is to find beside; `None` where that does not come to
     /// two, or a model cannot be simulated.
     pub fn searched_from_two(self, found: &Fitted, fitting: &'a Fitting<'a>) -> Option<Found<'a>> {
-        let mut search = self.looked_over(fitting);
+        let mut search = self.looked_over(None, fitting);
         search.take_two(found)?;
         Found::of(search, MOST_EFFECTS).filter(|found| found.best().causes() > 1)
     }
 
-    fn looked_over(self, fitting: &'a Fitting<'a>) -> Search<'a> {
+    /// A search that has looked for single causes, also from one that was found in another way.
+    fn looked_over(self, found: Option<&Fitted>, fitting: &'a Fitting<'a>) -> Search<'a> {
         let mut search = self.singles(fitting);
+        if let Some(found) = found {
+            search.take_single(found);
+        }
         search.look_beyond();
         search
     }
@@ -122,8 +126,9 @@ impl<'a> Begun<'a> {
             }
             narrow = found.search;
         }
-        let mut wide = at_once.map_or_else(wide, Ok)?.looked_over(fitting);
-        if let Some(wins) = wins_alone(&mut narrow, &mut wide) {
+        let own = narrow.best_single();
+        let mut wide = at_once.map_or_else(wide, Ok)?.looked_over(own.as_ref(), fitting);
+        if let Some(wins) = wins_alone(&narrow, own.as_ref(), &mut wide) {
             let winner = if wins { &mut narrow } else { &mut wide };
             if let Some(chosen) = winner.up_to(1).filter(Chosen::names_causes) {
                 let (search, other) = if wins { (narrow, wide) } else { (wide, narrow) };
@@ -151,13 +156,13 @@ impl<'a> Begun<'a> {
 /// Whether the single cause that looks best beats the one of a way that allows more, where that one has a name and leaves nothing, and neither
 /// does the better one; `None` where that is not so. Then several effects would hardly have the odds, and others alone need only be looked for
 /// in full where the better one was found.
-fn wins_alone(narrow: &mut Search, wide: &mut Search) -> Option<bool> {
-    let (own, other) = (narrow.best_single(), wide.best_single()?);
+fn wins_alone(narrow: &Search, own: Option<&Fitted>, wide: &mut Search) -> Option<bool> {
+    let other = wide.best_single()?;
     let other = Best { search: wide, fitted: &other };
     if other.is_unlisted() || !other.says_all() {
         return None;
     }
-    let Some(own) = &own else { return Some(false) };
+    let Some(own) = own else { return Some(false) };
     let own = Best { search: narrow, fitted: own };
     let wins = own.beats(&other);
     (!wins || own.says_all()).then_some(wins)

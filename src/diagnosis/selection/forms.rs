@@ -78,8 +78,7 @@ impl Search<'_> {
 
     /// Whether a hypothesis explains so much less than a best one that says all that neither the end of its fit nor another form changes anything.
     pub(super) fn is_out_of_reach(&self, best: Option<&Judged>, other: &Judged) -> bool {
-        let says_all = |best: &&Judged| is_possible(best) && !is_unsound(&best.fitted.losses, &self.bench.data);
-        best.filter(says_all).is_some_and(|best| {
+        best.filter(|best| self.says_all(best)).is_some_and(|best| {
             let before = beyond_noise(&self.baseline.losses);
             let [best, rival] = [best, other].map(|judged| &judged.fitted.hypothesis);
             let may_be_simpler = best.parts.len() == 1 && rival.size() < best.size();

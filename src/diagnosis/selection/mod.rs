@@ -182,7 +182,7 @@ impl<'a> Search<'a> {
         let mut singles = self.levels[0].clone();
         if !self.is_refined {
             if let Some(best) = singles.first_mut() {
-                *best = self.in_best_form(best.clone(), None);
+                *best = self.best_single.take().unwrap_or_else(|| self.in_best_form(best.clone(), None));
                 self.best_single = Some(best.clone());
             }
             singles = sorted(singles);
@@ -230,6 +230,34 @@ impl<'a> Search<'a> {
             self.levels.push(next);
         }
         self.choose()
+    }
+
+    /// Takes a single effect that was found elsewhere, in the form that it has there, where that is better than what was found of it here: which start
+    /// promises most hangs on how the coefficients may be off.
+    pub fn take_single(&mut self, found: &Fitted) {
+        let ([_], None) = (&found.hypothesis.parts[..], found.hypothesis.beside) else { return };
+        let Some(fitted) = self.bench.exact_fit(&found.hypothesis, &found.parameters, Scope::All) else { return };
+        let single = self.judge(fitted);
+        let singles = &mut self.levels[0];
+        if singles.iter().any(|known| same_effects(known, &single) && known.score >= single.score) {
+            return;
+        }
+        singles.retain(|known| !same_effects(known, &single));
+        let mut singles = std::mem::take(singles);
+        let is_best = singles.first().is_none_or(|best| single.score > best.score);
+        singles.push(single);
+        singles = sorted(singles);
+        if is_best {
+            singles = self.judged_anew(singles);
+            // What leaves nothing is in its best form.
+            self.best_single = singles.first().filter(|best| self.says_all(best)).cloned();
+        }
+        self.levels[0] = singles;
+    }
+
+    /// Whether a hypothesis can be, and leaves no more than a sound model may.
+    fn says_all(&self, judged: &Judged) -> bool {
+        is_possible(judged) && !is_unsound(&judged.fitted.losses, &self.bench.data)
     }
 
     /// Takes two effects that were found elsewhere, and what is as good as they are here, for all that there is to find of one or two.
