@@ -357,16 +357,27 @@ enum Listing {
     Variables,
 }
 
-/// What a command has to say: to a person and to a machine.
+/// What a command has to say: to a person, with notes beside it, and to a machine, whose JSON holds the notes.
 struct Answer {
     text: String,
+    notes: Vec<String>,
     json: Value,
+}
+
+impl Answer {
+    /// An answer without notes.
+    fn plain(text: String, json: Value) -> Self {
+        Self { text, notes: Vec::new(), json }
+    }
 }
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
     match run(cli.command) {
         Ok(answer) => {
+            if !cli.json {
+                answer.notes.iter().for_each(|note| eprintln!("note: {note}"));
+            }
             let output = if cli.json { format!("{:#}", answer.json) } else { answer.text };
             // Whoever stops reading early, as `head` does, has all that was wanted.
             let _ = writeln!(std::io::stdout(), "{}", output.trim_end());
@@ -451,7 +462,7 @@ fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Re
     }
     let files = export::write_whole(files)?;
     let text = format!("{}{}", table(rows).text, listed(&files));
-    Ok(Answer { text, json: json!({ "errors": errors, "files": names(&files) }) })
+    Ok(Answer::plain(text, json!({ "errors": errors, "files": names(&files) })))
 }
 
 /// The paths as text, which those of some systems are only nearly.
@@ -483,9 +494,9 @@ fn run_identification(
         rows.push([name, format!("{value:.5e}"), bound(-1.0), bound(1.0), unit]);
     }
     let rows = rows.into_iter().map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect();
-    found.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let said = identification::report::sentences(&found).join("\n");
-    Ok(Answer { text: format!("{said}\n\n{}\n{}", table(rows).text, listed(&files)), json })
+    let text = format!("{said}\n\n{}\n{}", table(rows).text, listed(&files));
+    Ok(Answer { text, notes: found.notes, json })
 }
 
 fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
@@ -497,7 +508,7 @@ fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path
     let files = export::write_whole(found.files(out))?;
     let mut json = found.to_json();
     json["files"] = json!(names(&files));
-    Ok(Answer { text: format!("{}\n{}", found.sentence(), listed(&files)), json })
+    Ok(Answer::plain(format!("{}\n{}", found.sentence(), listed(&files)), json))
 }
 
 fn run_comparison(
@@ -520,16 +531,16 @@ fn run_comparison(
     };
     let found = compare(muscles.into_iter().map(read).collect::<Result<_>>()?, &models)?;
     let files = export::write_whole(comparison::report::files(&found, out))?;
-    let mut text = String::new();
+    let (mut text, mut notes) = (String::new(), Vec::new());
     for muscle in &found.muscles {
-        muscle.points.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        notes.extend(muscle.points.notes.iter().cloned());
         let rows = comparison::report::table_of(muscle);
         let rows = rows.into_iter().map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect();
         text += &format!("{}\n\n{}\n", comparison::report::headline(muscle), table(rows).text);
     }
     let mut json = comparison::report::to_json(&found);
     json["files"] = json!(names(&files));
-    Ok(Answer { text: text + &listed(&files), json })
+    Ok(Answer { text: text + &listed(&files), notes, json })
 }
 
 fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {
@@ -540,7 +551,7 @@ fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f
     let files = export::write_whole(files)?;
     let mut json = report::to_json(&found);
     json["files"] = json!(names(&files));
-    Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), json })
+    Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), notes: found.notes, json })
 }
 
 /// A diagnosis in a few lines.
@@ -570,7 +581,7 @@ fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
     let files = export::write_whole(plan::files(&found, &nominal, &arguments.out))?;
     let mut json = plan::to_json(&found);
     json["files"] = json!(names(&files));
-    Ok(Answer { text: format!("{}\n{}", planned(&found), listed(&files)), json })
+    Ok(Answer::plain(format!("{}\n{}", planned(&found), listed(&files)), json))
 }
 
 /// A plan in a table or two.
@@ -616,7 +627,7 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
         1e3 * worst.point.contraction,
         listed(&files)
     );
-    Ok(Answer { text, json })
+    Ok(Answer::plain(text, json))
 }
 
 fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
@@ -626,7 +637,7 @@ fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
     let files = export::write_whole(closed_loop::files(&evaluation, out))?;
     let mut json = closed_loop::to_json(&evaluation);
     json["files"] = json!(names(&files));
-    Ok(Answer { text: listed(&files), json })
+    Ok(Answer::plain(listed(&files), json))
 }
 
 fn run_reproduction(out: &Path) -> Result<Answer> {
@@ -636,7 +647,7 @@ fn run_reproduction(out: &Path) -> Result<Answer> {
     let files = export::write_whole(reproduction::files(&found, out))?;
     let mut json = reproduction::to_json(&found);
     json["files"] = json!(names(&files));
-    Ok(Answer { text: listed(&files), json })
+    Ok(Answer::plain(listed(&files), json))
 }
 
 fn run_demo(out: &Path) -> Result<Answer> {
@@ -654,14 +665,15 @@ fn run_demo(out: &Path) -> Result<Answer> {
         told = told(&made.diagnosis),
         diagnosis = out.join("diagnosis").display(),
     );
-    Ok(Answer { text, json: json!({ "files": names(&made.files), "diagnosis": report::to_json(&made.diagnosis) }) })
+    let json = json!({ "files": names(&made.files), "diagnosis": report::to_json(&made.diagnosis) });
+    Ok(Answer { text, notes: made.diagnosis.notes, json })
 }
 
 fn export_fmus(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {
     let files = export::export(parameters, &package::libraries(libraries)?, out)?;
     ssp::warnings(parameters).iter().for_each(|note| eprintln!("note: {note}"));
     let paths = names(&files);
-    Ok(Answer { text: paths.join("\n"), json: json!({ "files": paths }) })
+    Ok(Answer::plain(paths.join("\n"), json!({ "files": paths })))
 }
 
 /// Rows of named texts, as a table and as JSON.
@@ -674,7 +686,7 @@ fn table(rows: Vec<Vec<(&str, String)>>) -> Answer {
     };
     let text = rows.iter().map(|row| line(row).trim_end().to_owned() + "\n").collect();
     let json = rows.iter().map(|row| row.iter().map(|(key, text)| ((*key).to_owned(), json!(text))).collect());
-    Answer { text, json: Value::Array(json.map(Value::Object).collect()) }
+    Answer::plain(text, Value::Array(json.map(Value::Object).collect()))
 }
 
 fn list(what: Listing) -> Answer {
@@ -716,7 +728,7 @@ fn list_effects() -> Answer {
         });
         all.push(Value::Object(object));
     }
-    Answer { text, json: Value::Array(all) }
+    Answer::plain(text, Value::Array(all))
 }
 
 fn list_variables() -> Answer {
@@ -746,5 +758,5 @@ fn list_variables() -> Answer {
             all.push(Value::Object(object));
         }
     }
-    Answer { text: table(rows).text, json: Value::Array(all) }
+    Answer::plain(table(rows).text, Value::Array(all))
 }

@@ -77,6 +77,15 @@ def test_simulation_says_how_far_off_it_is(sinew, tmp_path):
     assert sorted(str(path) for path in tmp_path.iterdir()) == sorted(answer["files"])
 
 
+def test_diagnosis_says_its_notes_to_people_and_machines(sinew, tmp_path):
+    path = recording(tmp_path / "short.csv", rows=[f"{0.01 * row:.2f},{2 + row % 2},2.0,100.0,392.4,40" for row in range(50)])
+    told = run(sinew, "diagnose", path, "--out", tmp_path / "out")
+    answer = run(sinew, "diagnose", path, "--out", tmp_path / "out", "--json")
+    notes = json.loads(answer.stdout)["notes"]
+    assert notes and all(f"note: {note}" in told.stderr.splitlines() for note in notes)
+    assert not any(note in answer.stderr for note in notes)
+
+
 def test_diagnosis_of_next_to_nothing_stays_finite(sinew, tmp_path):
     """Half a second at rest without any noise: a refusal or a result, but no NaN."""
     path, out = recording(tmp_path / "short.csv"), tmp_path / "out"
