@@ -181,6 +181,12 @@ pub enum Error {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// A file that would take the place of one that it was made from.
+    #[error("this would overwrite {}, which was read: choose another --out", path.display())]
+    Overwrites {
+        /// The file.
+        path: PathBuf,
+    },
     /// A platform that FMI does not know.
     #[error("`{argument}` is not PLATFORM=FILE with PLATFORM one of linux64, linux32, win64, win32, darwin64")]
     Platform {

@@ -6,14 +6,12 @@ use crate::package::{Library, fmu};
 use crate::parameters::Parameters;
 use crate::{Error, Result, ssp};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes the FMUs of all models, and the closed loop made of them, into a folder and returns their paths.
-///
-/// # Errors
-/// [`Error::Io`]; no FMU is then half-written.
-pub fn export(parameters: &Parameters, libraries: &[Library], folder: &Path) -> Result<Vec<PathBuf>> {
+/// The FMUs of all models, and the closed loop made of them, as paths in `folder` with their bytes.
+pub fn files(parameters: &Parameters, libraries: &[Library], folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let interfaces: Vec<_> = models().iter().map(|model| model.interface()).collect();
     let fmus = || {
         let named = |interface: &Interface| folder.join(format!("{}.fmu", interface.name));
@@ -22,15 +20,20 @@ pub fn export(parameters: &Parameters, libraries: &[Library], folder: &Path) -> 
     let system = || (folder.join(ssp::FILE_NAME), ssp::closed_loop(parameters, libraries));
     let (mut files, system): (Vec<_>, _) = rayon::join(fmus, system);
     files.push(system);
-    write_whole(files)
+    files
 }
 
 /// Writes files whole or not at all, making their folders: each is written under another name first and renamed when
-/// all are complete.
+/// all are complete. What was `read` to make them stays as it is.
 ///
 /// # Errors
-/// [`Error::Io`] with the path that could not be written.
-pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>) -> Result<Vec<PathBuf>> {
+/// [`Error::Overwrites`] for a file that was read; [`Error::Io`] with the path that could not be written.
+pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>, read: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let read: BTreeSet<PathBuf> = read.iter().filter_map(|path| path.canonicalize().ok()).collect();
+    let was_read = |path: &Path| path.canonicalize().is_ok_and(|path| read.contains(&path));
+    if let Some((path, _)) = files.iter().find(|(path, _)| was_read(path)) {
+        return Err(Error::Overwrites { path: path.clone() });
+    }
     let mut complete = Vec::new();
     for (path, bytes) in files {
         let io = |source| Error::Io { path: path.clone(), source };
@@ -52,4 +55,24 @@ pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>) -> Result<Vec<PathBuf>> {
         written.push(path);
     }
     Ok(written)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_read_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("simulated.csv");
+        let files = |text: &str| vec![(path.clone(), text.as_bytes().to_vec())];
+        write_whole(files("old"), &[]).unwrap();
+        let elsewhere = folder.path().join("x").join("..").join("simulated.csv");
+        std::fs::create_dir(folder.path().join("x")).unwrap();
+        let refused = write_whole(files("new"), &[elsewhere]).unwrap_err().to_string();
+        assert_eq!(refused, format!("this would overwrite {}, which was read: choose another --out", path.display()));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+        write_whole(files("new"), &[folder.path().join("other.csv")]).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "new");
+    }
 }

@@ -224,6 +224,14 @@ impl PlanArguments {
         self.diagnosis.as_deref().or_else(there)
     }
 
+    /// Files that it reads, where they are there.
+    fn reads(&self) -> Vec<PathBuf> {
+        let beside = |path: &Path| ["nominal.toml", "extended.toml"].map(|name| path.with_file_name(name));
+        let of_diagnosis =
+            self.of_diagnosis().into_iter().flat_map(|path| beside(path).into_iter().chain([path.into()]));
+        of_diagnosis.chain(self.nominal.iter().map(PathBuf::from)).collect()
+    }
+
     /// The model that was diagnosed.
     fn nominal(&self) -> Result<Parameters> {
         let beside = self.of_diagnosis().map(|path| path.with_file_name("nominal.toml"));
@@ -294,6 +302,10 @@ impl ParameterSource {
     fn load(&self) -> Result<Parameters> {
         Parameters::load(&self.source)
     }
+
+    fn path(&self) -> PathBuf {
+        PathBuf::from(&self.source)
+    }
 }
 
 #[derive(Args)]
@@ -358,16 +370,24 @@ enum Listing {
 }
 
 /// What a command has to say: to a person, with notes beside it, and to a machine, whose JSON holds the notes.
+#[derive(Default)]
 struct Answer {
     text: String,
     notes: Vec<String>,
     json: Value,
+    /// What is yet to be written.
+    files: Vec<(PathBuf, Vec<u8>)>,
 }
 
 impl Answer {
-    /// An answer without notes.
-    fn plain(text: String, json: Value) -> Self {
-        Self { text, notes: Vec::new(), json }
+    /// Writes its files, none of them over one that was read, and says which.
+    fn write(mut self, read: &[PathBuf]) -> Result<Self> {
+        if !self.files.is_empty() {
+            let written = names(&export::write_whole(std::mem::take(&mut self.files), read)?);
+            self.text = format!("{}\n\n{}", self.text.trim_end(), written.join("\n")).trim_start().to_owned();
+            self.json["files"] = json!(written);
+        }
+        Ok(self)
     }
 }
 
@@ -390,7 +410,38 @@ fn main() -> ExitCode {
     }
 }
 
+impl Command {
+    /// Files that it reads, where they are there.
+    fn reads(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Export { parameters, libraries, .. } => {
+                let files = libraries.iter().filter_map(|library| library.split_once('='));
+                files.map(|(_, file)| file.into()).chain([parameters.path()]).collect()
+            }
+            Self::Simulate { recordings, parameters, .. }
+            | Self::Identify { recordings, parameters, .. }
+            | Self::Hammerstein { recordings, parameters, .. }
+            | Self::Diagnose { recordings, parameters, .. } => {
+                recordings.files.iter().cloned().chain([parameters.path()]).collect()
+            }
+            Self::Compare { files, parameters, muscles, .. } => {
+                let of_muscles =
+                    muscles.iter().flat_map(|(source, files)| files.iter().cloned().chain([source.into()]));
+                files.iter().cloned().chain([parameters.path()]).chain(of_muscles).collect()
+            }
+            Self::Plan(arguments) => arguments.reads(),
+            Self::Tune { parameters, .. } => vec![parameters.path()],
+            Self::ClosedLoop { .. } | Self::Reproduce { .. } | Self::Demo { .. } | Self::List { .. } => Vec::new(),
+        }
+    }
+}
+
 fn run(command: Command) -> Result<Answer> {
+    let read = command.reads();
+    answer(command)?.write(&read)
+}
+
+fn answer(command: Command) -> Result<Answer> {
     match command {
         Command::Export { parameters, out, libraries } => export_fmus(&parameters.load()?, &out, &libraries),
         Command::Simulate { recordings, parameters, out } => simulate(&parameters.load()?, &recordings.read()?, &out),
@@ -460,18 +511,12 @@ fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Re
             }
         }
     }
-    let files = export::write_whole(files)?;
-    let text = format!("{}{}", table(rows).text, listed(&files));
-    Ok(Answer::plain(text, json!({ "errors": errors, "files": names(&files) })))
+    Ok(Answer { text: table(rows).text, json: json!({ "errors": errors }), files, ..Answer::default() })
 }
 
 /// The paths as text, which those of some systems are only nearly.
 fn names(files: &[PathBuf]) -> Vec<String> {
     files.iter().map(|path| path.display().to_string()).collect()
-}
-
-fn listed(files: &[PathBuf]) -> String {
-    names(files).into_iter().map(|name| name + "\n").collect()
 }
 
 fn run_identification(
@@ -483,9 +528,6 @@ fn run_identification(
 ) -> Result<Answer> {
     let braid = if fixed_braid { Braid::Given } else { Braid::Fitted };
     let found = identify(recordings, parameters, model, braid)?;
-    let files = export::write_whole(identification::report::files(&found, out))?;
-    let mut json = identification::report::to_json(&found);
-    json["files"] = json!(names(&files));
     let mut rows = vec![["parameter", "value", "95 % from", "to", "unit"].map(str::to_owned)];
     let fitted = &found.found.fitted;
     for ((free, value), half) in fitted.structure.free.iter().zip(&fitted.values).zip(&fitted.half_widths) {
@@ -495,8 +537,9 @@ fn run_identification(
     }
     let rows = rows.into_iter().map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect();
     let said = identification::report::sentences(&found).join("\n");
-    let text = format!("{said}\n\n{}\n{}", table(rows).text, listed(&files));
-    Ok(Answer { text, notes: found.notes, json })
+    let text = format!("{said}\n\n{}", table(rows).text);
+    let (json, files) = (identification::report::to_json(&found), identification::report::files(&found, out));
+    Ok(Answer { text, notes: found.notes, json, files })
 }
 
 fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
@@ -505,10 +548,7 @@ fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path
         return Err(Error::Recording { path: recordings[1].path.clone(), problem });
     };
     let found = hammerstein::identify(recording, parameters)?;
-    let files = export::write_whole(found.files(out))?;
-    let mut json = found.to_json();
-    json["files"] = json!(names(&files));
-    Ok(Answer::plain(format!("{}\n{}", found.sentence(), listed(&files)), json))
+    Ok(Answer { text: found.sentence(), json: found.to_json(), files: found.files(out), ..Answer::default() })
 }
 
 fn run_comparison(
@@ -530,7 +570,6 @@ fn run_comparison(
         Ok(Muscle { name, given, recordings: read_recordings(&files, renamed)? })
     };
     let found = compare(muscles.into_iter().map(read).collect::<Result<_>>()?, &models)?;
-    let files = export::write_whole(comparison::report::files(&found, out))?;
     let (mut text, mut notes) = (String::new(), Vec::new());
     for muscle in &found.muscles {
         notes.extend(muscle.points.notes.iter().cloned());
@@ -538,9 +577,8 @@ fn run_comparison(
         let rows = rows.into_iter().map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect();
         text += &format!("{}\n\n{}\n", comparison::report::headline(muscle), table(rows).text);
     }
-    let mut json = comparison::report::to_json(&found);
-    json["files"] = json!(names(&files));
-    Ok(Answer { text: text + &listed(&files), notes, json })
+    let (json, files) = (comparison::report::to_json(&found), comparison::report::files(&found, out));
+    Ok(Answer { text, notes, json, files })
 }
 
 fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {
@@ -548,10 +586,7 @@ fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f
     let found = diagnose(parameters, recordings, tolerance, &counting(&fits))?;
     fits.finish_and_clear();
     let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
-    let files = export::write_whole(files)?;
-    let mut json = report::to_json(&found);
-    json["files"] = json!(names(&files));
-    Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), notes: found.notes, json })
+    Ok(Answer { text: told(&found), json: report::to_json(&found), notes: found.notes, files })
 }
 
 /// A diagnosis in a few lines.
@@ -578,10 +613,8 @@ fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
     let bar = progress(plan::pieces(&limits));
     let found = plan::plan(&task, &nominal, tolerance, &limits, &counting(&bar))?;
     bar.finish_and_clear();
-    let files = export::write_whole(plan::files(&found, &nominal, &arguments.out))?;
-    let mut json = plan::to_json(&found);
-    json["files"] = json!(names(&files));
-    Ok(Answer::plain(format!("{}\n{}", planned(&found), listed(&files)), json))
+    let files = plan::files(&found, &nominal, &arguments.out);
+    Ok(Answer { text: planned(&found), json: plan::to_json(&found), files, ..Answer::default() })
 }
 
 /// A plan in a table or two.
@@ -605,9 +638,7 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
     masses.dedup();
     let parameters = source.load()?;
     let tuning = tuning::tune(&parameters, &masses)?;
-    let files = export::write_whole(tuning::files(&tuning, &parameters, &source.source, out))?;
-    let mut json = tuning::to_json(&tuning);
-    json["files"] = json!(names(&files));
+    let files = tuning::files(&tuning, &parameters, &source.source, out);
     let controller = &tuning.parameters.controller;
     let worst = tuning.worst();
     let least =
@@ -615,7 +646,7 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
     let text = format!(
         "proportional {:.4} V/m, integral {:.4} V/(m s), derivative {:.4} V s/m\n\
          gain margin {:.2}, phase margin {:.0}°, dead time margin {:.0} ms; sensitivity peak {:.2} on plants that are not quite known,\n\
-         at its worst with {} kg at {:.0} mm\n\n{}",
+         at its worst with {} kg at {:.0} mm\n",
         controller.proportional_gain,
         controller.integral_gain,
         controller.derivative_gain,
@@ -625,29 +656,24 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
         worst.uncertain.sensitivity,
         worst.point.mass,
         1e3 * worst.point.contraction,
-        listed(&files)
     );
-    Ok(Answer::plain(text, json))
+    Ok(Answer { text, json: tuning::to_json(&tuning), files, ..Answer::default() })
 }
 
 fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
     let bar = progress(closed_loop::pieces());
     let evaluation = closed_loop::evaluate(plants as usize, &counting(&bar))?;
     bar.finish_and_clear();
-    let files = export::write_whole(closed_loop::files(&evaluation, out))?;
-    let mut json = closed_loop::to_json(&evaluation);
-    json["files"] = json!(names(&files));
-    Ok(Answer::plain(listed(&files), json))
+    let (json, files) = (closed_loop::to_json(&evaluation), closed_loop::files(&evaluation, out));
+    Ok(Answer { json, files, ..Answer::default() })
 }
 
 fn run_reproduction(out: &Path) -> Result<Answer> {
     let bar = progress(reproduction::pieces());
     let found = reproduction::reproduce(&counting(&bar))?;
     bar.finish_and_clear();
-    let files = export::write_whole(reproduction::files(&found, out))?;
-    let mut json = reproduction::to_json(&found);
-    json["files"] = json!(names(&files));
-    Ok(Answer::plain(listed(&files), json))
+    let (json, files) = (reproduction::to_json(&found), reproduction::files(&found, out));
+    Ok(Answer { json, files, ..Answer::default() })
 }
 
 fn run_demo(out: &Path) -> Result<Answer> {
@@ -666,14 +692,13 @@ fn run_demo(out: &Path) -> Result<Answer> {
         diagnosis = out.join("diagnosis").display(),
     );
     let json = json!({ "files": names(&made.files), "diagnosis": report::to_json(&made.diagnosis) });
-    Ok(Answer { text, notes: made.diagnosis.notes, json })
+    Ok(Answer { text, notes: made.diagnosis.notes, json, ..Answer::default() })
 }
 
 fn export_fmus(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {
-    let files = export::export(parameters, &package::libraries(libraries)?, out)?;
+    let files = export::files(parameters, &package::libraries(libraries)?, out);
     ssp::warnings(parameters).iter().for_each(|note| eprintln!("note: {note}"));
-    let paths = names(&files);
-    Ok(Answer::plain(paths.join("\n"), json!({ "files": paths })))
+    Ok(Answer { json: json!({}), files, ..Answer::default() })
 }
 
 /// Rows of named texts, as a table and as JSON.
@@ -686,7 +711,7 @@ fn table(rows: Vec<Vec<(&str, String)>>) -> Answer {
     };
     let text = rows.iter().map(|row| line(row).trim_end().to_owned() + "\n").collect();
     let json = rows.iter().map(|row| row.iter().map(|(key, text)| ((*key).to_owned(), json!(text))).collect());
-    Answer::plain(text, Value::Array(json.map(Value::Object).collect()))
+    Answer { text, json: Value::Array(json.map(Value::Object).collect()), ..Answer::default() }
 }
 
 fn list(what: Listing) -> Answer {
@@ -728,7 +753,7 @@ fn list_effects() -> Answer {
         });
         all.push(Value::Object(object));
     }
-    Answer::plain(text, Value::Array(all))
+    Answer { text, json: Value::Array(all), ..Answer::default() }
 }
 
 fn list_variables() -> Answer {
@@ -758,5 +783,5 @@ fn list_variables() -> Answer {
             all.push(Value::Object(object));
         }
     }
-    Answer::plain(table(rows).text, Value::Array(all))
+    Answer { text: table(rows).text, json: Value::Array(all), ..Answer::default() }
 }

@@ -144,6 +144,20 @@ def test_unwritable_folder_is_refused(sinew, tmp_path, command):
     assert (tmp_path / "file").read_text() == "in the way"
 
 
+def test_what_was_read_is_not_overwritten(sinew, tmp_path):
+    (own := tmp_path / "out").mkdir()
+    simulated = recording(own / "simulated.csv")
+    (tmp_path / "link.csv").symlink_to(simulated)
+    parameters = write_parameters(own / "parameters.toml", {})
+    before = {path: path.read_text() for path in (simulated, parameters)}
+    for command in [("simulate", simulated), ("simulate", tmp_path / "link.csv"), ("tune", "--parameters", parameters)]:
+        message = refusal(sinew, *command, "--out", own)
+        assert "would overwrite" in message and "--out" in message and str(own) in message
+    assert {path: path.read_text() for path in own.iterdir()} == before
+    for _ in range(2):
+        run(sinew, "simulate", simulated, "--out", tmp_path / "other")
+
+
 def test_failing_halfway_leaves_nothing(sinew, tmp_path):
     """The last of the four FMUs cannot be written: a folder has its name."""
     (tmp_path / f"{MODELS[-1]}.fmu").mkdir()
