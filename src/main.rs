@@ -134,7 +134,8 @@ enum Command {
     #[command(after_help = "Examples:\n  sinew plan sinew-diagnosis/diagnosis.json --load-mass 20,40 --out plan\n  \
         sinew plan --effects payload_mass,force_gain --load-mass 20 --sensors contraction\n  \
         sinew plan --effects all\n\n\
-        plan.csv holds the command to play; diagnose what you record with it together with the recordings there are.\n\
+        plan.csv, or plan-1.csv and plan-2.csv where two belong together, hold the command to play; diagnose what you record\n\
+        with them together with the recordings there are.\n\
         Without a diagnosis, the recording is planned that tells all effects apart as well as one can.")]
     Plan(PlanArguments),
     /// Choose the gains of the controller for a range of loads, and say how robust they are
@@ -191,8 +192,8 @@ struct PlanArguments {
     #[arg(long = "parameters", value_name = "FILE|PRESET")]
     nominal: Option<String>,
     /// Effects to tell apart instead, at a usual size; or `all`
-    #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
-    effects: Vec<String>,
+    #[arg(long, value_name = "NAME,NAME", value_parser = contenders)]
+    effects: Option<Contenders>,
     /// Sensors of the rig, where no diagnosis tells them
     #[arg(long, value_delimiter = ',', default_value = "gauge_pressure,contraction", value_parser = sensor)]
     sensors: Vec<Signal>,
@@ -211,7 +212,7 @@ struct PlanArguments {
     /// Relative error of the nominal coefficients that is no cause [default: that of the diagnosis, or else 0.03]
     #[arg(long, value_parser = tolerance)]
     tolerance: Option<f64>,
-    /// Folder for plan.csv, plan.json and the plots
+    /// Folder for plan.csv, or plan-1.csv and plan-2.csv, plan.json and the plots; those of an earlier plan go
     #[arg(long, default_value = "sinew-plan")]
     out: PathBuf,
 }
@@ -220,7 +221,7 @@ impl PlanArguments {
     /// The diagnosis that it is about.
     fn of_diagnosis(&self) -> Option<&Path> {
         let usual = Path::new("sinew-diagnosis/diagnosis.json");
-        let there = || (self.effects.is_empty() && usual.is_file()).then_some(usual);
+        let there = || (self.effects.is_none() && usual.is_file()).then_some(usual);
         self.diagnosis.as_deref().or_else(there)
     }
 
@@ -238,13 +239,15 @@ impl PlanArguments {
         match (&self.nominal, beside) {
             (Some(given), _) => Parameters::load(given),
             (None, Some(beside)) if beside.is_file() => Parameters::load(&beside.display().to_string()),
-            (None, beside) => {
-                if let Some(beside) = beside {
-                    eprintln!("note: there is no {}: planned for {USUAL_MUSCLE}", beside.display());
-                }
-                Parameters::load(USUAL_MUSCLE)
-            }
+            (None, _) => Parameters::load(USUAL_MUSCLE),
         }
+    }
+
+    /// That it is planned for another model than was diagnosed, where that is not known.
+    fn note(&self) -> Option<String> {
+        let beside = self.of_diagnosis()?.with_file_name("nominal.toml");
+        (self.nominal.is_none() && !beside.is_file())
+            .then(|| format!("there is no {}: planned for {USUAL_MUSCLE}", beside.display()))
     }
 
     /// What is to be told apart.
@@ -254,7 +257,7 @@ impl PlanArguments {
         {
             return Ok(task);
         }
-        let names: &[String] = if self.effects == ["all"] { &[] } else { &self.effects };
+        let names = self.effects.as_ref().map_or(&[][..], |Contenders(names)| names);
         Task::of_effects(names, &self.sensors, nominal)
     }
 
@@ -265,6 +268,25 @@ impl PlanArguments {
             load_masses: self.load_mass.clone(),
             duration: self.duration,
         }
+    }
+}
+
+/// Effects that are to be told apart; all where none is named.
+#[derive(Clone)]
+struct Contenders(Vec<String>);
+
+fn contenders(text: &str) -> std::result::Result<Contenders, String> {
+    if text == "all" {
+        return Ok(Contenders(Vec::new()));
+    }
+    let names: Vec<String> = text.split(',').map(str::to_owned).collect();
+    if let Some(unknown) = names.iter().find(|name| Effects::description(name).is_none()) {
+        return Err(format!("there is no effect `{unknown}`; `sinew list effects` shows all"));
+    }
+    match (1..names.len()).find(|k| names[..*k].contains(&names[*k])) {
+        Some(k) => Err(format!("`{}` stands there twice", names[k])),
+        None if names.len() < 2 => Err("name at least two effects that are to be told apart, or `all`".to_owned()),
+        None => Ok(Contenders(names)),
     }
 }
 
@@ -377,6 +399,8 @@ struct Answer {
     json: Value,
     /// What is yet to be written.
     files: Vec<(PathBuf, Vec<u8>)>,
+    /// What is to go when that is done.
+    outdated: Vec<PathBuf>,
 }
 
 impl Answer {
@@ -386,6 +410,9 @@ impl Answer {
             let written = names(&export::write_whole(std::mem::take(&mut self.files), read)?);
             self.text = format!("{}\n\n{}", self.text.trim_end(), written.join("\n")).trim_start().to_owned();
             self.json["files"] = json!(written);
+        }
+        for path in &self.outdated {
+            std::fs::remove_file(path).map_err(|source| Error::Io { path: path.clone(), source })?;
         }
         Ok(self)
     }
@@ -539,7 +566,7 @@ fn run_identification(
     let said = identification::report::sentences(&found).join("\n");
     let text = format!("{said}\n\n{}", table(rows).text);
     let (json, files) = (identification::report::to_json(&found), identification::report::files(&found, out));
-    Ok(Answer { text, notes: found.notes, json, files })
+    Ok(Answer { text, notes: found.notes, json, files, ..Answer::default() })
 }
 
 fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
@@ -578,7 +605,7 @@ fn run_comparison(
         text += &format!("{}\n\n{}\n", comparison::report::headline(muscle), table(rows).text);
     }
     let (json, files) = (comparison::report::to_json(&found), comparison::report::files(&found, out));
-    Ok(Answer { text, notes, json, files })
+    Ok(Answer { text, notes, json, files, ..Answer::default() })
 }
 
 fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {
@@ -586,7 +613,8 @@ fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f
     let found = diagnose(parameters, recordings, tolerance, &counting(&fits))?;
     fits.finish_and_clear();
     let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
-    Ok(Answer { text: told(&found), json: report::to_json(&found), notes: found.notes, files })
+    let (text, json) = (told(&found), report::to_json(&found));
+    Ok(Answer { text, json, notes: found.notes, files, ..Answer::default() })
 }
 
 /// A diagnosis in a few lines.
@@ -609,12 +637,14 @@ fn told(found: &Diagnosis) -> String {
 fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
     let (nominal, limits) = (arguments.nominal()?, arguments.limits());
     let task = arguments.task(&nominal)?;
+    arguments.note().iter().for_each(|note| eprintln!("note: {note}"));
     let tolerance = arguments.tolerance.or(task.tolerance).unwrap_or(diagnosis::DEFAULT_TOLERANCE);
     let bar = progress(plan::pieces(&limits));
     let found = plan::plan(&task, &nominal, tolerance, &limits, &counting(&bar))?;
     bar.finish_and_clear();
     let files = plan::files(&found, &nominal, &arguments.out);
-    Ok(Answer { text: planned(&found), json: plan::to_json(&found), files, ..Answer::default() })
+    let outdated = plan::outdated(&arguments.out, &files);
+    Ok(Answer { text: planned(&found), json: plan::to_json(&found), files, outdated, ..Answer::default() })
 }
 
 /// A plan in a table or two.

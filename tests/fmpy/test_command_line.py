@@ -126,6 +126,7 @@ def test_bad_parameters_are_refused(sinew, tmp_path, text, named):
     ("export", "--library", "amiga=README.md"),
     ("simulate", "absent.csv"),
     ("diagnose", "absent.csv"),
+    ("plan", "absent.json"),
 ], ids=" ".join)
 def test_what_is_not_there_is_named(sinew, tmp_path, arguments):
     message = refusal(sinew, *arguments, "--out", tmp_path / "out")
@@ -167,7 +168,9 @@ def test_failing_halfway_leaves_nothing(sinew, tmp_path):
 
 
 @pytest.mark.parametrize("arguments", [(), ("exprot",), ("export", "--nonsense"), ("list",), ("list", "everything"),
-                                       ("simulate",)], ids=lambda a: " ".join(a) or "nothing")
+                                       ("simulate",), ("plan", "--effects", "creep,creep"), ("plan", "--effects", ""),
+                                       ("plan", "--effects", "creep"), ("plan", "--effects", "creep,nope")],
+                         ids=lambda a: " ".join(a) or "nothing")
 def test_wrong_usage_is_two(sinew, arguments):
     done = subprocess.run([sinew, *arguments], capture_output=True, text=True)
     assert done.returncode == 2
