@@ -595,7 +595,11 @@ impl Column {
             return Ok(f64::NAN);
         }
         match cell.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number * self.scale + self.offset),
+            Ok(number) if number.is_finite() => {
+                let value = number * self.scale + self.offset;
+                let problem = || format!("{cell} {} is more than a computer can count: correct it", self.unit);
+                value.is_finite().then_some(value).ok_or_else(|| self.error(path, line, problem()))
+            }
             _ => {
                 Err(self.error(path, line, format!("`{cell}` is not a number; leave the cell empty if it is missing")))
             }
@@ -885,6 +889,10 @@ mod tests {
             (
                 rows(header, |k| if k == 2 { "2,abc,1,20".into() } else { row(k) }),
                 "r.csv: line 4, column `command [V]`: `abc`",
+            ),
+            (
+                rows(&header.replace("[m]", "[kN]").replace("contraction", "force"), |k| format!("{k},1,1e306,20")),
+                "r.csv: line 2, column `force [kN]`: 1e306 kN is more than",
             ),
             (rows(header, |k| format!("{k},1,0.1,-5")), "r.csv: line 2, column `load_mass`: -5 kg"),
             (rows(header, |k| format!("{k},1,0.1,{}", 20 + k)), "r.csv: line 3, column `load_mass`: the load changes"),
