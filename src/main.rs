@@ -14,7 +14,7 @@ use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
 use sinew::simulation::{OUTPUTS, replay, rms_difference};
-use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, reproduction, ssp, tuning};
+use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, quality, reproduction, ssp, tuning};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -355,6 +355,12 @@ fn read_recordings(files: &[PathBuf], renamed: &[(String, String)]) -> Result<Ve
     Ok(recordings)
 }
 
+/// Refuses units that contradict each other or the muscle, and says of which it is in doubt.
+fn check_units(recordings: &[Recording], parameters: &Parameters) -> Result<()> {
+    quality::notes_on_units(recordings, parameters)?.iter().for_each(|note| eprintln!("note: {note}"));
+    Ok(())
+}
+
 fn renaming(text: &str) -> std::result::Result<(String, String), String> {
     match text.split_once('=') {
         Some((theirs, ours)) if !theirs.is_empty() && !ours.is_empty() => Ok((theirs.to_owned(), ours.to_owned())),
@@ -517,6 +523,7 @@ fn fits() -> ProgressBar {
 }
 
 fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
+    check_units(recordings, parameters)?;
     let replayed = |recording| Ok([replay(parameters, recording)?]);
     let replays = recordings.iter().map(replayed).collect::<Result<Vec<_>>>()?;
     let mut files = vec![(out.join("simulated.csv"), report::simulated_csv(["simulated"], recordings, &replays))];
@@ -553,6 +560,7 @@ fn run_identification(
     fixed_braid: bool,
     out: &Path,
 ) -> Result<Answer> {
+    check_units(recordings, parameters)?;
     let braid = if fixed_braid { Braid::Given } else { Braid::Fitted };
     let found = identify(recordings, parameters, model, braid)?;
     let mut rows = vec![["parameter", "value", "95 % from", "to", "unit"].map(str::to_owned)];
@@ -574,6 +582,7 @@ fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path
         let problem = "a Hammerstein model is one of a single recording: give one".to_owned();
         return Err(Error::Recording { path: recordings[1].path.clone(), problem });
     };
+    check_units(recordings, parameters)?;
     let found = hammerstein::identify(recording, parameters)?;
     Ok(Answer { text: found.sentence(), json: found.to_json(), files: found.files(out), ..Answer::default() })
 }
@@ -594,7 +603,9 @@ fn run_comparison(
         let given = Parameters::load(&source)?;
         let short = stem(&source);
         let name = if stems.iter().filter(|other| **other == short).count() > 1 { source } else { short };
-        Ok(Muscle { name, given, recordings: read_recordings(&files, renamed)? })
+        let recordings = read_recordings(&files, renamed)?;
+        check_units(&recordings, &given)?;
+        Ok(Muscle { name, given, recordings })
     };
     let found = compare(muscles.into_iter().map(read).collect::<Result<_>>()?, &models)?;
     let (mut text, mut notes) = (String::new(), Vec::new());

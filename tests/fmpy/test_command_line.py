@@ -61,6 +61,15 @@ def test_bad_recording_is_refused(sinew, tmp_path, command, change, named):
     assert not out.exists()
 
 
+@pytest.mark.parametrize("command", ["simulate", "identify", "compare", "hammerstein", "diagnose"])
+def test_wrong_unit_is_refused(sinew, tmp_path, command):
+    text = (ROOT / "data" / "nominal_40kg.csv").read_text()
+    path = tmp_path / "wrong.csv"
+    path.write_text(text.replace("gauge_pressure [bar]", "gauge_pressure [Pa]"))
+    message = refusal(sinew, command, path, "--out", tmp_path / "out")
+    assert str(path) in message and "write `gauge_pressure [bar]`" in message
+
+
 def test_repeated_time_is_left_out_and_said(sinew, tmp_path):
     path = recording(tmp_path / "repeated.csv", rows=replaced(20, "0.19,2.0,2.0,100.0,392.4,40"))
     done = run(sinew, "simulate", path, "--out", tmp_path / "out")
