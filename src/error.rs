@@ -195,6 +195,18 @@ pub enum Error {
     },
 }
 
+/// A text on one line that does nothing to a terminal: control characters are written out, a line break as `\n`.
+pub fn printable(text: &str) -> String {
+    text.chars().fold(String::new(), |mut line, c| {
+        if c.is_control() {
+            line.extend(c.escape_debug())
+        } else {
+            line.push(c)
+        }
+        line
+    })
+}
+
 /// A unit as it stands behind a number.
 fn spaced(unit: &str) -> String {
     if unit == "1" { String::new() } else { format!(" {unit}") }
@@ -202,3 +214,13 @@ fn spaced(unit: &str) -> String {
 
 /// `Result` with Sinew's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_written_out() {
+        assert_eq!(printable("a\nb\0\u{1b}[2J 'é\"\\"), "a\\nb\\0\\u{1b}[2J 'é\"\\");
+    }
+}

@@ -14,7 +14,9 @@ use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
 use sinew::simulation::{OUTPUTS, replay, rms_difference};
-use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, quality, reproduction, ssp, tuning};
+use sinew::{
+    Error, Result, closed_loop, demo, export, hammerstein, package, printable, quality, reproduction, ssp, tuning,
+};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -346,18 +348,23 @@ impl RecordingSource {
     }
 }
 
+/// Says beside the answer what a person should know.
+fn say_note(note: &str) {
+    eprintln!("note: {}", printable(note));
+}
+
 /// Reads recordings and says what of them is not used.
 fn read_recordings(files: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<Recording>> {
     let recordings = measurement::read_all(files, renamed)?;
     for recording in &recordings {
-        recording.notes.iter().for_each(|note| eprintln!("note: {}: {note}", recording.name()));
+        recording.notes.iter().for_each(|note| say_note(&format!("{}: {note}", recording.name())));
     }
     Ok(recordings)
 }
 
 /// Refuses units that contradict each other or the muscle, and says of which it is in doubt.
 fn check_units(recordings: &[Recording], parameters: &Parameters) -> Result<()> {
-    quality::notes_on_units(recordings, parameters)?.iter().for_each(|note| eprintln!("note: {note}"));
+    quality::notes_on_units(recordings, parameters)?.iter().for_each(|note| say_note(note));
     Ok(())
 }
 
@@ -429,7 +436,7 @@ fn main() -> ExitCode {
     match run(cli.command) {
         Ok(answer) => {
             if !cli.json {
-                answer.notes.iter().for_each(|note| eprintln!("note: {note}"));
+                answer.notes.iter().for_each(|note| say_note(note));
             }
             let output = if cli.json { format!("{:#}", answer.json) } else { answer.text };
             // Whoever stops reading early, as `head` does, has all that was wanted.
@@ -437,7 +444,7 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(error) => {
-            eprintln!("sinew: {error}");
+            eprintln!("sinew: {}", printable(&error.to_string()));
             ExitCode::from(1)
         }
     }
@@ -598,11 +605,12 @@ fn run_comparison(
         path if path.is_file() => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         _ => source.clone(),
     };
+    let stem = |source: &String| printable(&stem(source));
     let stems: Vec<String> = muscles.iter().map(|(source, _)| stem(source)).collect();
     let read = |(source, files): (String, Vec<PathBuf>)| -> Result<Muscle> {
         let given = Parameters::load(&source)?;
         let short = stem(&source);
-        let name = if stems.iter().filter(|other| **other == short).count() > 1 { source } else { short };
+        let name = if stems.iter().filter(|other| **other == short).count() > 1 { printable(&source) } else { short };
         let recordings = read_recordings(&files, renamed)?;
         check_units(&recordings, &given)?;
         Ok(Muscle { name, given, recordings })
@@ -648,7 +656,7 @@ fn told(found: &Diagnosis) -> String {
 fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
     let (nominal, limits) = (arguments.nominal()?, arguments.limits());
     let task = arguments.task(&nominal)?;
-    arguments.note().iter().for_each(|note| eprintln!("note: {note}"));
+    arguments.note().iter().for_each(|note| say_note(note));
     let tolerance = arguments.tolerance.or(task.tolerance).unwrap_or(diagnosis::DEFAULT_TOLERANCE);
     let bar = progress(plan::pieces(&limits));
     let found = plan::plan(&task, &nominal, tolerance, &limits, &counting(&bar))?;
@@ -738,7 +746,7 @@ fn run_demo(out: &Path) -> Result<Answer> {
 
 fn export_fmus(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {
     let files = export::files(parameters, &package::libraries(libraries)?, out);
-    ssp::warnings(parameters).iter().for_each(|note| eprintln!("note: {note}"));
+    ssp::warnings(parameters).iter().for_each(|note| say_note(note));
     Ok(Answer { json: json!({}), files, ..Answer::default() })
 }
 

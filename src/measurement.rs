@@ -1,7 +1,7 @@
 //! Recordings: columns of a CSV file in SI units.
 
 use crate::start::Motion;
-use crate::{Error, Result};
+use crate::{Error, Result, printable};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -75,7 +75,7 @@ pub enum Between {
 pub struct Recording {
     /// Where it was read from.
     pub path: PathBuf,
-    /// What people call it.
+    /// What people call it, without control characters.
     name: String,
     /// Its number among those that were read together, from 1; `None` where it was read alone.
     number: Option<usize>,
@@ -153,7 +153,7 @@ impl Recording {
             check_time(path, line, signals.get(&Time))?;
         }
         check_mass(path, &lines, signals.get(&LoadMass))?;
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let name = printable(&path.file_name().unwrap_or(path.as_os_str()).to_string_lossy());
         let time = signals.remove(&Time).unwrap_or_default();
         let units = columns.iter().flatten().map(|column| (column.signal, column.unit)).collect();
         Self {
@@ -560,7 +560,7 @@ pub fn read_all(paths: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<R
     let names: Vec<String> = recordings.iter().map(Recording::name).collect();
     for recording in &mut recordings {
         if names.iter().filter(|name| **name == recording.name).count() > 1 {
-            recording.name = recording.path.display().to_string();
+            recording.name = printable(&recording.path.display().to_string());
         }
     }
     Ok(numbered(recordings))
@@ -855,6 +855,13 @@ mod tests {
         assert_eq!(recording.load_mass(), Some(20.0));
         let at_once = "the load moves at the start: simulations begin at 0.0 mm with 200 mm/s";
         assert_eq!(recording.notes, ["column `remark` is not used", at_once]);
+    }
+
+    #[test]
+    fn a_name_stays_on_its_line() {
+        let text = rows("time [s],command [V],contraction [m]", |k| format!("{k},1,0.1"));
+        let recording = Recording::parse(text.as_bytes(), Path::new("a\n[load]\nmass = 1.csv"), &[]).unwrap();
+        assert_eq!(recording.name(), "a\\n[load]\\nmass = 1.csv");
     }
 
     #[test]
