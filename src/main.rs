@@ -439,9 +439,15 @@ fn main() -> ExitCode {
                 answer.notes.iter().for_each(|note| say_note(note));
             }
             let output = if cli.json { format!("{:#}", answer.json) } else { answer.text };
-            // Whoever stops reading early, as `head` does, has all that was wanted.
-            let _ = writeln!(std::io::stdout(), "{}", output.trim_end());
-            ExitCode::SUCCESS
+            let mut stdout = std::io::stdout();
+            match writeln!(stdout, "{}", output.trim_end()).and_then(|()| stdout.flush()) {
+                // Whoever stops reading early, as `head` does, has all that was wanted.
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                    eprintln!("sinew: the answer cannot be written to standard output: {error}");
+                    ExitCode::from(1)
+                }
+                _ => ExitCode::SUCCESS,
+            }
         }
         Err(error) => {
             eprintln!("sinew: {}", printable(&error.to_string()));

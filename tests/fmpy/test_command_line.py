@@ -211,7 +211,13 @@ def test_output_may_be_cut_off(sinew):
     os.close(reader)
     done = subprocess.run([sinew, "list", "variables"], stdout=writer, stderr=subprocess.PIPE, text=True)
     os.close(writer)
-    assert "panicked" not in done.stderr
+    assert done.returncode == 0 and "panicked" not in done.stderr
+
+
+def test_lost_output_is_a_failure(sinew):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sinew, "list", "effects"], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and "standard output" in done.stderr
 
 
 def test_binary_alone_exports(sinew, tmp_path):
