@@ -550,11 +550,11 @@ impl Recording {
 /// # Errors
 /// As [`Recording::read`]; [`Error::Recording`] for a file that is given twice.
 pub fn read_all(paths: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<Recording>> {
-    for (index, path) in paths.iter().enumerate() {
-        if paths[..index].contains(path) {
-            let problem = "is given twice: a copy proves nothing about the original".to_owned();
-            return Err(Error::Recording { path: path.clone(), problem });
-        }
+    // However it is spelt, a file is the same; what is not there is named when it is read.
+    let files: Vec<PathBuf> = paths.iter().map(|path| path.canonicalize().unwrap_or_else(|_| path.clone())).collect();
+    if let Some(index) = (1..files.len()).find(|index| files[..*index].contains(&files[*index])) {
+        let problem = "is given twice: a copy proves nothing about the original".to_owned();
+        return Err(Error::Recording { path: paths[index].clone(), problem });
     }
     let mut recordings = paths.iter().map(|path| Recording::read(path, renamed)).collect::<Result<Vec<_>>>()?;
     let names: Vec<String> = recordings.iter().map(Recording::name).collect();
@@ -855,6 +855,17 @@ mod tests {
         assert_eq!(recording.load_mass(), Some(20.0));
         let at_once = "the load moves at the start: simulations begin at 0.0 mm with 200 mm/s";
         assert_eq!(recording.notes, ["column `remark` is not used", at_once]);
+    }
+
+    #[test]
+    fn a_file_is_the_same_however_it_is_spelt() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.csv");
+        std::fs::write(&path, rows("time [s],command [V],contraction [m]", |k| format!("{k},1,0.1"))).unwrap();
+        std::fs::create_dir(folder.path().join("x")).unwrap();
+        let again = folder.path().join("x").join("..").join("r.csv");
+        let refused = read_all(&[path, again.clone()], &[]).unwrap_err().to_string();
+        assert!(refused.starts_with(&format!("{}: is given twice", again.display())), "{refused}");
     }
 
     #[test]
