@@ -41,12 +41,13 @@ pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>, read: &[PathBuf]) -> Result<V
             return Err(io(std::io::Error::other("there is a folder of this name: remove it or choose another --out")));
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
+        std::fs::create_dir_all(folder).map_err(|source| no_folder(folder, source))?;
         let mut builder = tempfile::Builder::new();
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666)); // the umask narrows it
-        let mut file = builder.tempfile_in(folder).map_err(io)?;
-        file.write_all(&bytes).map_err(io)?;
+        // The other name is nobody's business.
+        let mut file = builder.tempfile_in(folder).map_err(|error| io(error.kind().into()))?;
+        file.as_file_mut().write_all(&bytes).map_err(io)?;
         complete.push((path, file));
     }
     let mut written = Vec::new();
@@ -57,9 +58,30 @@ pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>, read: &[PathBuf]) -> Result<V
     Ok(written)
 }
 
+/// A folder that cannot be made.
+fn no_folder(folder: &Path, source: std::io::Error) -> Error {
+    let in_the_way = folder.ancestors().find(|path| path.exists() && !path.is_dir());
+    let source = in_the_way.map_or(source, |file| {
+        std::io::Error::other(format!("{} is a file and no folder: choose another --out", file.display()))
+    });
+    Error::Io { path: folder.to_owned(), source }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_keeps_a_file_from_being_written_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "in the way").unwrap();
+        for out in [file.clone(), file.join("out")] {
+            let refused = write_whole(vec![(out.join("a.csv"), Vec::new())], &[]).unwrap_err().to_string();
+            let expected = format!("{} is a file and no folder: choose another --out", file.display());
+            assert_eq!(refused, format!("{}: {expected}", out.display()));
+        }
+    }
 
     #[test]
     fn what_was_read_stays() {
