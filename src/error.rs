@@ -181,6 +181,14 @@ pub enum Error {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// A file that is given as an FMU library and is none.
+    #[error("{}: no shared library for {platform}: give that which `cargo build --package sinew-fmu` makes there", path.display())]
+    NoLibrary {
+        /// The file.
+        path: PathBuf,
+        /// FMI's name of the platform.
+        platform: &'static str,
+    },
     /// A file that would take the place of one that it was made from.
     #[error("this would overwrite {}, which was read: choose another --out", path.display())]
     Overwrites {

@@ -108,7 +108,9 @@ enum Command {
         #[command(flatten)]
         parameters: ParameterSource,
         /// Geometry and recordings of a muscle; once for each muscle
-        #[arg(long = "muscle", value_name = "PARAMETERS=FILE[,FILE]", value_parser = muscle_files)]
+        #[arg(
+            long = "muscle", value_name = "PARAMETERS=FILE[,FILE]", value_parser = muscle_files, conflicts_with = "source"
+        )]
         muscles: Vec<(String, Vec<PathBuf>)>,
         /// Force models [default: all]
         #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', value_parser = force_model)]

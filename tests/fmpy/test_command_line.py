@@ -133,6 +133,7 @@ def test_bad_parameters_are_refused(sinew, tmp_path, text, named):
     ("export", "--parameters", "absent.toml"),
     ("export", "--library", "linux64=absent.so"),
     ("export", "--library", "amiga=README.md"),
+    ("export", "--library", f"linux64={ROOT / 'README.md'}"),
     ("simulate", "absent.csv"),
     ("diagnose", "absent.csv"),
     ("plan", "absent.json"),
@@ -178,6 +179,7 @@ def test_failing_halfway_leaves_nothing(sinew, tmp_path):
 
 @pytest.mark.parametrize("arguments", [(), ("exprot",), ("export", "--nonsense"), ("list",), ("list", "everything"),
                                        ("simulate",), ("plan", "--effects", "creep,creep"), ("plan", "--effects", ""),
+                                       ("compare", "--muscle", "dmsp-40-290=a.csv", "--parameters", "dmsp-40-290"),
                                        ("plan", "--effects", "creep"), ("plan", "--effects", "creep,nope")],
                          ids=lambda a: " ".join(a) or "nothing")
 def test_wrong_usage_is_two(sinew, arguments):
