@@ -23,17 +23,24 @@ pub fn files(parameters: &Parameters, libraries: &[Library], folder: &Path) -> V
     files
 }
 
+/// Refuses to write over what was read, however it is spelt.
+///
+/// # Errors
+/// [`Error::Overwrites`].
+pub fn spare<'a>(written: impl IntoIterator<Item = &'a Path>, read: &[PathBuf]) -> Result<()> {
+    let read: BTreeSet<PathBuf> = read.iter().filter_map(|path| path.canonicalize().ok()).collect();
+    let was_read = |path: &&Path| path.canonicalize().is_ok_and(|path| read.contains(&path));
+    let found = written.into_iter().find(was_read);
+    found.map_or(Ok(()), |path| Err(Error::Overwrites { path: path.to_owned() }))
+}
+
 /// Writes files whole or not at all, making their folders: each is written under another name first and renamed when
 /// all are complete. What was `read` to make them stays as it is.
 ///
 /// # Errors
 /// [`Error::Overwrites`] for a file that was read; [`Error::Io`] with the path that could not be written.
 pub fn write_whole(files: Vec<(PathBuf, Vec<u8>)>, read: &[PathBuf]) -> Result<Vec<PathBuf>> {
-    let read: BTreeSet<PathBuf> = read.iter().filter_map(|path| path.canonicalize().ok()).collect();
-    let was_read = |path: &Path| path.canonicalize().is_ok_and(|path| read.contains(&path));
-    if let Some((path, _)) = files.iter().find(|(path, _)| was_read(path)) {
-        return Err(Error::Overwrites { path: path.clone() });
-    }
+    spare(files.iter().map(|(path, _)| path.as_path()), read)?;
     let mut complete = Vec::new();
     for (path, bytes) in files {
         let io = |source| Error::Io { path: path.clone(), source };

@@ -486,6 +486,11 @@ impl Command {
 
 fn run(command: Command) -> Result<Answer> {
     let read = command.reads();
+    if let Command::Diagnose { out, .. } = &command {
+        // So much is known before a long search.
+        let again = ["nominal.toml", "extended.toml", "simulated.csv"].map(|name| out.join(name));
+        export::spare(again.iter().map(PathBuf::as_path), &read)?;
+    }
     answer(command)?.write(&read)
 }
 

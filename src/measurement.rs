@@ -143,8 +143,8 @@ impl Recording {
             }
         }
         if !signals.contains_key(&Time) {
-            let all: Vec<&str> = headers.iter().map(|header| header.trim_start_matches('\u{feff}')).collect();
-            let example = all.iter().find(|header| !header.is_empty()).unwrap_or(&"clock");
+            let all: Vec<&str> = headers.iter().collect();
+            let example = unused.iter().find(|header| !header.is_empty()).unwrap_or(&"clock");
             let problem = format!(
                 "there is no column `time [s]` among {}: rename one, or say which it is, as in --map \"{example}=time [s]\"",
                 listed(&all)

@@ -87,7 +87,8 @@ def test_simulation_says_how_far_off_it_is(sinew, tmp_path):
 
 
 def test_diagnosis_says_its_notes_to_people_and_machines(sinew, tmp_path):
-    path = recording(tmp_path / "short.csv", rows=[f"{0.01 * row:.2f},{2 + row % 2},2.0,100.0,392.4,40" for row in range(50)])
+    path = tmp_path / "short.csv"
+    path.write_text("".join((ROOT / "data" / "nominal_40kg.csv").read_text().splitlines(keepends=True)[:1200]))
     told = run(sinew, "diagnose", path, "--out", tmp_path / "out")
     answer = run(sinew, "diagnose", path, "--out", tmp_path / "out", "--json")
     notes = json.loads(answer.stdout)["notes"]
@@ -159,9 +160,10 @@ def test_what_was_read_is_not_overwritten(sinew, tmp_path):
     (own := tmp_path / "out").mkdir()
     simulated = recording(own / "simulated.csv")
     (tmp_path / "link.csv").symlink_to(simulated)
-    parameters = write_parameters(own / "parameters.toml", {})
-    before = {path: path.read_text() for path in (simulated, parameters)}
-    for command in [("simulate", simulated), ("simulate", tmp_path / "link.csv"), ("tune", "--parameters", parameters)]:
+    parameters, nominal = (write_parameters(own / name, {}) for name in ("parameters.toml", "nominal.toml"))
+    before = {path: path.read_text() for path in (simulated, parameters, nominal)}
+    for command in [("simulate", simulated), ("simulate", tmp_path / "link.csv"), ("tune", "--parameters", parameters),
+                    ("diagnose", simulated), ("diagnose", recording(tmp_path / "r.csv"), "--parameters", nominal)]:
         message = refusal(sinew, *command, "--out", own)
         assert "would overwrite" in message and "--out" in message and str(own) in message
     assert {path: path.read_text() for path in own.iterdir()} == before
