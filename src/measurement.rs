@@ -326,7 +326,7 @@ impl Recording {
         let command = self.bridged(Command).filter(|_| self.between != Between::Lines);
         let jumps = command.map(|command| self.far_jumps(&command)).unwrap_or_default();
         let alone = self.alone(every);
-        let stays = |k: &usize| k % every == 0 || jumps.contains(k) || alone.contains(k);
+        let stays = |k: &usize| k.is_multiple_of(every) || jumps.contains(k) || alone.contains(k);
         let kept: Vec<usize> = (0..self.time.len()).filter(stays).collect();
         let picked = |values: &[f64]| kept.iter().map(|k| values[*k]).collect();
         let weights = |position: usize| -> Vec<(usize, f64)> {
