@@ -1,5 +1,6 @@
 //! The main job in one go, on recordings that ship with the program.
 
+use crate::Result;
 use crate::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, Fitting, diagnose, report};
 use crate::export;
 use crate::measurement::{Recording, numbered};
@@ -7,7 +8,6 @@ use crate::package::Library;
 use crate::parameters::Parameters;
 use crate::plot::{Curve, plot};
 use crate::simulation::{ClosedLoop, closed_loop};
-use crate::{Result, diagnosis};
 use std::path::{Path, PathBuf};
 
 /// Recordings of a muscle with dry friction in it, simulated by an independent program; see `data/README.md`.
@@ -41,16 +41,15 @@ pub fn run(folder: &Path, fitting: &Fitting<'_>) -> Result<Demo> {
         .collect::<Result<Vec<_>>>()?;
     let recordings = numbered(recordings);
     let diagnosis = diagnose(&nominal, &recordings, DEFAULT_TOLERANCE, fitting)?;
-    let mut files = diagnosis::report::files(&diagnosis, &nominal, &recordings, &libraries, &folder.join("diagnosis"))?;
+    let mut files = export::files(&nominal, &libraries, &folder.join("nominal"));
+    files.extend(report::files(&diagnosis, &nominal, &recordings, &libraries, &folder.join("diagnosis"))?);
     files.push((folder.join("closed_loop.svg"), closed_loop_plot(&closed_loop).into_bytes()));
     for (name, bytes) in RECORDINGS {
         files.push((folder.join("recordings").join(name), bytes.to_vec()));
     }
     let residual = report::residual_plot(&nominal, &diagnosis.extended, &recordings[1])?;
     files.extend(residual.map(|svg| (folder.join("residual.svg"), svg.into_bytes())));
-    let mut written = export::export(&nominal, &libraries, &folder.join("nominal"))?;
-    written.extend(export::write_whole(files)?);
-    Ok(Demo { closed_loop, diagnosis, files: written })
+    Ok(Demo { closed_loop, diagnosis, files: export::write_whole(files, &[])? })
 }
 
 fn closed_loop_plot(course: &ClosedLoop) -> String {

@@ -181,12 +181,38 @@ pub enum Error {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// A file that is given as an FMU library and is none.
+    #[error("{}: no shared library for {platform}: give that which `cargo build --package sinew-fmu` makes there", path.display())]
+    NoLibrary {
+        /// The file.
+        path: PathBuf,
+        /// FMI's name of the platform.
+        platform: &'static str,
+    },
+    /// A file that would take the place of one that it was made from.
+    #[error("this would overwrite {}, which was read: choose another --out", path.display())]
+    Overwrites {
+        /// The file.
+        path: PathBuf,
+    },
     /// A platform that FMI does not know.
     #[error("`{argument}` is not PLATFORM=FILE with PLATFORM one of linux64, linux32, win64, win32, darwin64")]
     Platform {
         /// What was given.
         argument: String,
     },
+}
+
+/// A text on one line that does nothing to a terminal: control characters are written out, a line break as `\n`.
+pub fn printable(text: &str) -> String {
+    text.chars().fold(String::new(), |mut line, c| {
+        if c.is_control() {
+            line.extend(c.escape_debug())
+        } else {
+            line.push(c)
+        }
+        line
+    })
 }
 
 /// A unit as it stands behind a number.
@@ -196,3 +222,13 @@ fn spaced(unit: &str) -> String {
 
 /// `Result` with Sinew's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_written_out() {
+        assert_eq!(printable("a\nb\0\u{1b}[2J 'é\"\\"), "a\\nb\\0\\u{1b}[2J 'é\"\\");
+    }
+}

@@ -62,7 +62,7 @@ mod start;
 #[cfg(feature = "tool")]
 pub mod tuning;
 
-pub use error::{Error, Result};
+pub use error::{Error, Result, printable};
 
 /// Standard gravity, m/s², as the thesis uses it (eq. 5.4).
 pub const GRAVITY: f64 = 9.81;

@@ -14,7 +14,9 @@ use sinew::models::models;
 use sinew::muscle::ForceModelName;
 use sinew::parameters::{Parameters, presets};
 use sinew::simulation::{OUTPUTS, replay, rms_difference};
-use sinew::{Error, Result, closed_loop, demo, export, hammerstein, package, reproduction, ssp, tuning};
+use sinew::{
+    Error, Result, closed_loop, demo, export, hammerstein, package, printable, quality, reproduction, ssp, tuning,
+};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -106,7 +108,9 @@ enum Command {
         #[command(flatten)]
         parameters: ParameterSource,
         /// Geometry and recordings of a muscle; once for each muscle
-        #[arg(long = "muscle", value_name = "PARAMETERS=FILE[,FILE]", value_parser = muscle_files)]
+        #[arg(
+            long = "muscle", value_name = "PARAMETERS=FILE[,FILE]", value_parser = muscle_files, conflicts_with = "source"
+        )]
         muscles: Vec<(String, Vec<PathBuf>)>,
         /// Force models [default: all]
         #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', value_parser = force_model)]
@@ -134,7 +138,8 @@ enum Command {
     #[command(after_help = "Examples:\n  sinew plan sinew-diagnosis/diagnosis.json --load-mass 20,40 --out plan\n  \
         sinew plan --effects payload_mass,force_gain --load-mass 20 --sensors contraction\n  \
         sinew plan --effects all\n\n\
-        plan.csv holds the command to play; diagnose what you record with it together with the recordings there are.\n\
+        plan.csv, or plan-1.csv and plan-2.csv where two belong together, hold the command to play; diagnose what you record\n\
+        with them together with the recordings there are.\n\
         Without a diagnosis, the recording is planned that tells all effects apart as well as one can.")]
     Plan(PlanArguments),
     /// Choose the gains of the controller for a range of loads, and say how robust they are
@@ -191,8 +196,8 @@ struct PlanArguments {
     #[arg(long = "parameters", value_name = "FILE|PRESET")]
     nominal: Option<String>,
     /// Effects to tell apart instead, at a usual size; or `all`
-    #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
-    effects: Vec<String>,
+    #[arg(long, value_name = "NAME,NAME", value_parser = contenders)]
+    effects: Option<Contenders>,
     /// Sensors of the rig, where no diagnosis tells them
     #[arg(long, value_delimiter = ',', default_value = "gauge_pressure,contraction", value_parser = sensor)]
     sensors: Vec<Signal>,
@@ -211,7 +216,7 @@ struct PlanArguments {
     /// Relative error of the nominal coefficients that is no cause [default: that of the diagnosis, or else 0.03]
     #[arg(long, value_parser = tolerance)]
     tolerance: Option<f64>,
-    /// Folder for plan.csv, plan.json and the plots
+    /// Folder for plan.csv, or plan-1.csv and plan-2.csv, plan.json and the plots; those of an earlier plan go
     #[arg(long, default_value = "sinew-plan")]
     out: PathBuf,
 }
@@ -220,8 +225,16 @@ impl PlanArguments {
     /// The diagnosis that it is about.
     fn of_diagnosis(&self) -> Option<&Path> {
         let usual = Path::new("sinew-diagnosis/diagnosis.json");
-        let there = || (self.effects.is_empty() && usual.is_file()).then_some(usual);
+        let there = || (self.effects.is_none() && usual.is_file()).then_some(usual);
         self.diagnosis.as_deref().or_else(there)
+    }
+
+    /// Files that it reads, where they are there.
+    fn reads(&self) -> Vec<PathBuf> {
+        let beside = |path: &Path| ["nominal.toml", "extended.toml"].map(|name| path.with_file_name(name));
+        let of_diagnosis =
+            self.of_diagnosis().into_iter().flat_map(|path| beside(path).into_iter().chain([path.into()]));
+        of_diagnosis.chain(self.nominal.iter().map(PathBuf::from)).collect()
     }
 
     /// The model that was diagnosed.
@@ -230,13 +243,15 @@ impl PlanArguments {
         match (&self.nominal, beside) {
             (Some(given), _) => Parameters::load(given),
             (None, Some(beside)) if beside.is_file() => Parameters::load(&beside.display().to_string()),
-            (None, beside) => {
-                if let Some(beside) = beside {
-                    eprintln!("note: there is no {}: planned for {USUAL_MUSCLE}", beside.display());
-                }
-                Parameters::load(USUAL_MUSCLE)
-            }
+            (None, _) => Parameters::load(USUAL_MUSCLE),
         }
+    }
+
+    /// That it is planned for another model than was diagnosed, where that is not known.
+    fn note(&self) -> Option<String> {
+        let beside = self.of_diagnosis()?.with_file_name("nominal.toml");
+        (self.nominal.is_none() && !beside.is_file())
+            .then(|| format!("there is no {}: planned for {USUAL_MUSCLE}", beside.display()))
     }
 
     /// What is to be told apart.
@@ -246,7 +261,7 @@ impl PlanArguments {
         {
             return Ok(task);
         }
-        let names: &[String] = if self.effects == ["all"] { &[] } else { &self.effects };
+        let names = self.effects.as_ref().map_or(&[][..], |Contenders(names)| names);
         Task::of_effects(names, &self.sensors, nominal)
     }
 
@@ -257,6 +272,25 @@ impl PlanArguments {
             load_masses: self.load_mass.clone(),
             duration: self.duration,
         }
+    }
+}
+
+/// Effects that are to be told apart; all where none is named.
+#[derive(Clone)]
+struct Contenders(Vec<String>);
+
+fn contenders(text: &str) -> std::result::Result<Contenders, String> {
+    if text == "all" {
+        return Ok(Contenders(Vec::new()));
+    }
+    let names: Vec<String> = text.split(',').map(str::to_owned).collect();
+    if let Some(unknown) = names.iter().find(|name| Effects::description(name).is_none()) {
+        return Err(format!("there is no effect `{unknown}`; `sinew list effects` shows all"));
+    }
+    match (1..names.len()).find(|k| names[..*k].contains(&names[*k])) {
+        Some(k) => Err(format!("`{}` stands there twice", names[k])),
+        None if names.len() < 2 => Err("name at least two effects that are to be told apart, or `all`".to_owned()),
+        None => Ok(Contenders(names)),
     }
 }
 
@@ -294,6 +328,10 @@ impl ParameterSource {
     fn load(&self) -> Result<Parameters> {
         Parameters::load(&self.source)
     }
+
+    fn path(&self) -> PathBuf {
+        PathBuf::from(&self.source)
+    }
 }
 
 #[derive(Args)]
@@ -312,13 +350,24 @@ impl RecordingSource {
     }
 }
 
+/// Says beside the answer what a person should know.
+fn say_note(note: &str) {
+    eprintln!("note: {}", printable(note));
+}
+
 /// Reads recordings and says what of them is not used.
 fn read_recordings(files: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<Recording>> {
     let recordings = measurement::read_all(files, renamed)?;
     for recording in &recordings {
-        recording.notes.iter().for_each(|note| eprintln!("note: {}: {note}", recording.name()));
+        recording.notes.iter().for_each(|note| say_note(&format!("{}: {note}", recording.name())));
     }
     Ok(recordings)
+}
+
+/// Refuses units that contradict each other or the muscle, and says of which it is in doubt.
+fn check_units(recordings: &[Recording], parameters: &Parameters) -> Result<()> {
+    quality::notes_on_units(recordings, parameters)?.iter().for_each(|note| say_note(note));
+    Ok(())
 }
 
 fn renaming(text: &str) -> std::result::Result<(String, String), String> {
@@ -357,29 +406,95 @@ enum Listing {
     Variables,
 }
 
-/// What a command has to say: to a person and to a machine.
+/// What a command has to say: to a person, with notes beside it, and to a machine, whose JSON holds the notes.
+#[derive(Default)]
 struct Answer {
     text: String,
+    notes: Vec<String>,
     json: Value,
+    /// What is yet to be written.
+    files: Vec<(PathBuf, Vec<u8>)>,
+    /// What is to go when that is done.
+    outdated: Vec<PathBuf>,
+}
+
+impl Answer {
+    /// Writes its files, none of them over one that was read, and says which.
+    fn write(mut self, read: &[PathBuf]) -> Result<Self> {
+        if !self.files.is_empty() {
+            let written = names(&export::write_whole(std::mem::take(&mut self.files), read)?);
+            self.text = format!("{}\n\n{}", self.text.trim_end(), written.join("\n")).trim_start().to_owned();
+            self.json["files"] = json!(written);
+        }
+        for path in &self.outdated {
+            std::fs::remove_file(path).map_err(|source| Error::Io { path: path.clone(), source })?;
+        }
+        Ok(self)
+    }
 }
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
     match run(cli.command) {
         Ok(answer) => {
+            if !cli.json {
+                answer.notes.iter().for_each(|note| say_note(note));
+            }
             let output = if cli.json { format!("{:#}", answer.json) } else { answer.text };
-            // Whoever stops reading early, as `head` does, has all that was wanted.
-            let _ = writeln!(std::io::stdout(), "{}", output.trim_end());
-            ExitCode::SUCCESS
+            let mut stdout = std::io::stdout();
+            match writeln!(stdout, "{}", output.trim_end()).and_then(|()| stdout.flush()) {
+                // Whoever stops reading early, as `head` does, has all that was wanted.
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                    eprintln!("sinew: the answer cannot be written to standard output: {error}");
+                    ExitCode::from(1)
+                }
+                _ => ExitCode::SUCCESS,
+            }
         }
         Err(error) => {
-            eprintln!("sinew: {error}");
+            eprintln!("sinew: {}", printable(&error.to_string()));
             ExitCode::from(1)
         }
     }
 }
 
+impl Command {
+    /// Files that it reads, where they are there.
+    fn reads(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Export { parameters, libraries, .. } => {
+                let files = libraries.iter().filter_map(|library| library.split_once('='));
+                files.map(|(_, file)| file.into()).chain([parameters.path()]).collect()
+            }
+            Self::Simulate { recordings, parameters, .. }
+            | Self::Identify { recordings, parameters, .. }
+            | Self::Hammerstein { recordings, parameters, .. }
+            | Self::Diagnose { recordings, parameters, .. } => {
+                recordings.files.iter().cloned().chain([parameters.path()]).collect()
+            }
+            Self::Compare { files, parameters, muscles, .. } => {
+                let of_muscles =
+                    muscles.iter().flat_map(|(source, files)| files.iter().cloned().chain([source.into()]));
+                files.iter().cloned().chain([parameters.path()]).chain(of_muscles).collect()
+            }
+            Self::Plan(arguments) => arguments.reads(),
+            Self::Tune { parameters, .. } => vec![parameters.path()],
+            Self::ClosedLoop { .. } | Self::Reproduce { .. } | Self::Demo { .. } | Self::List { .. } => Vec::new(),
+        }
+    }
+}
+
 fn run(command: Command) -> Result<Answer> {
+    let read = command.reads();
+    if let Command::Diagnose { out, .. } = &command {
+        // So much is known before a long search.
+        let again = ["nominal.toml", "extended.toml", "simulated.csv"].map(|name| out.join(name));
+        export::spare(again.iter().map(PathBuf::as_path), &read)?;
+    }
+    answer(command)?.write(&read)
+}
+
+fn answer(command: Command) -> Result<Answer> {
     match command {
         Command::Export { parameters, out, libraries } => export_fmus(&parameters.load()?, &out, &libraries),
         Command::Simulate { recordings, parameters, out } => simulate(&parameters.load()?, &recordings.read()?, &out),
@@ -428,6 +543,7 @@ fn fits() -> ProgressBar {
 }
 
 fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
+    check_units(recordings, parameters)?;
     let replayed = |recording| Ok([replay(parameters, recording)?]);
     let replays = recordings.iter().map(replayed).collect::<Result<Vec<_>>>()?;
     let mut files = vec![(out.join("simulated.csv"), report::simulated_csv(["simulated"], recordings, &replays))];
@@ -449,18 +565,12 @@ fn simulate(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Re
             }
         }
     }
-    let files = export::write_whole(files)?;
-    let text = format!("{}{}", table(rows).text, listed(&files));
-    Ok(Answer { text, json: json!({ "errors": errors, "files": names(&files) }) })
+    Ok(Answer { text: table(rows).text, json: json!({ "errors": errors }), files, ..Answer::default() })
 }
 
 /// The paths as text, which those of some systems are only nearly.
 fn names(files: &[PathBuf]) -> Vec<String> {
     files.iter().map(|path| path.display().to_string()).collect()
-}
-
-fn listed(files: &[PathBuf]) -> String {
-    names(files).into_iter().map(|name| name + "\n").collect()
 }
 
 fn run_identification(
@@ -470,11 +580,9 @@ fn run_identification(
     fixed_braid: bool,
     out: &Path,
 ) -> Result<Answer> {
+    check_units(recordings, parameters)?;
     let braid = if fixed_braid { Braid::Given } else { Braid::Fitted };
     let found = identify(recordings, parameters, model, braid)?;
-    let files = export::write_whole(identification::report::files(&found, out))?;
-    let mut json = identification::report::to_json(&found);
-    json["files"] = json!(names(&files));
     let mut rows = vec![["parameter", "value", "95 % from", "to", "unit"].map(str::to_owned)];
     let fitted = &found.found.fitted;
     for ((free, value), half) in fitted.structure.free.iter().zip(&fitted.values).zip(&fitted.half_widths) {
@@ -483,9 +591,10 @@ fn run_identification(
         rows.push([name, format!("{value:.5e}"), bound(-1.0), bound(1.0), unit]);
     }
     let rows = rows.into_iter().map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect();
-    found.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let said = identification::report::sentences(&found).join("\n");
-    Ok(Answer { text: format!("{said}\n\n{}\n{}", table(rows).text, listed(&files)), json })
+    let text = format!("{said}\n\n{}", table(rows).text);
+    let (json, files) = (identification::report::to_json(&found), identification::report::files(&found, out));
+    Ok(Answer { text, notes: found.notes, json, files, ..Answer::default() })
 }
 
 fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path) -> Result<Answer> {
@@ -493,11 +602,9 @@ fn run_hammerstein(parameters: &Parameters, recordings: &[Recording], out: &Path
         let problem = "a Hammerstein model is one of a single recording: give one".to_owned();
         return Err(Error::Recording { path: recordings[1].path.clone(), problem });
     };
+    check_units(recordings, parameters)?;
     let found = hammerstein::identify(recording, parameters)?;
-    let files = export::write_whole(found.files(out))?;
-    let mut json = found.to_json();
-    json["files"] = json!(names(&files));
-    Ok(Answer { text: format!("{}\n{}", found.sentence(), listed(&files)), json })
+    Ok(Answer { text: found.sentence(), json: found.to_json(), files: found.files(out), ..Answer::default() })
 }
 
 fn run_comparison(
@@ -511,25 +618,26 @@ fn run_comparison(
         path if path.is_file() => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         _ => source.clone(),
     };
+    let stem = |source: &String| printable(&stem(source));
     let stems: Vec<String> = muscles.iter().map(|(source, _)| stem(source)).collect();
     let read = |(source, files): (String, Vec<PathBuf>)| -> Result<Muscle> {
         let given = Parameters::load(&source)?;
         let short = stem(&source);
-        let name = if stems.iter().filter(|other| **other == short).count() > 1 { source } else { short };
-        Ok(Muscle { name, given, recordings: read_recordings(&files, renamed)? })
+        let name = if stems.iter().filter(|other| **other == short).count() > 1 { printable(&source) } else { short };
+        let recordings = read_recordings(&files, renamed)?;
+        check_units(&recordings, &given)?;
+        Ok(Muscle { name, given, recordings })
     };
     let found = compare(muscles.into_iter().map(read).collect::<Result<_>>()?, &models)?;
-    let files = export::write_whole(comparison::report::files(&found, out))?;
-    let mut text = String::new();
+    let (mut text, mut notes) = (String::new(), Vec::new());
     for muscle in &found.muscles {
-        muscle.points.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        notes.extend(muscle.points.notes.iter().cloned());
         let rows = comparison::report::table_of(muscle);
         let rows = rows.into_iter().map(|cells| cells.into_iter().map(|cell| ("", cell)).collect()).collect();
         text += &format!("{}\n\n{}\n", comparison::report::headline(muscle), table(rows).text);
     }
-    let mut json = comparison::report::to_json(&found);
-    json["files"] = json!(names(&files));
-    Ok(Answer { text: text + &listed(&files), json })
+    let (json, files) = (comparison::report::to_json(&found), comparison::report::files(&found, out));
+    Ok(Answer { text, notes, json, files, ..Answer::default() })
 }
 
 fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f64, out: &Path) -> Result<Answer> {
@@ -537,10 +645,8 @@ fn run_diagnosis(parameters: &Parameters, recordings: &[Recording], tolerance: f
     let found = diagnose(parameters, recordings, tolerance, &counting(&fits))?;
     fits.finish_and_clear();
     let files = report::files(&found, parameters, recordings, &package::libraries(&[])?, out)?;
-    let files = export::write_whole(files)?;
-    let mut json = report::to_json(&found);
-    json["files"] = json!(names(&files));
-    Ok(Answer { text: format!("{}\n{}", told(&found), listed(&files)), json })
+    let (text, json) = (told(&found), report::to_json(&found));
+    Ok(Answer { text, json, notes: found.notes, files, ..Answer::default() })
 }
 
 /// A diagnosis in a few lines.
@@ -563,14 +669,14 @@ fn told(found: &Diagnosis) -> String {
 fn run_plan(arguments: &PlanArguments) -> Result<Answer> {
     let (nominal, limits) = (arguments.nominal()?, arguments.limits());
     let task = arguments.task(&nominal)?;
+    arguments.note().iter().for_each(|note| say_note(note));
     let tolerance = arguments.tolerance.or(task.tolerance).unwrap_or(diagnosis::DEFAULT_TOLERANCE);
     let bar = progress(plan::pieces(&limits));
     let found = plan::plan(&task, &nominal, tolerance, &limits, &counting(&bar))?;
     bar.finish_and_clear();
-    let files = export::write_whole(plan::files(&found, &nominal, &arguments.out))?;
-    let mut json = plan::to_json(&found);
-    json["files"] = json!(names(&files));
-    Ok(Answer { text: format!("{}\n{}", planned(&found), listed(&files)), json })
+    let files = plan::files(&found, &nominal, &arguments.out);
+    let outdated = plan::outdated(&arguments.out, &files);
+    Ok(Answer { text: planned(&found), json: plan::to_json(&found), files, outdated, ..Answer::default() })
 }
 
 /// A plan in a table or two.
@@ -594,9 +700,7 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
     masses.dedup();
     let parameters = source.load()?;
     let tuning = tuning::tune(&parameters, &masses)?;
-    let files = export::write_whole(tuning::files(&tuning, &parameters, &source.source, out))?;
-    let mut json = tuning::to_json(&tuning);
-    json["files"] = json!(names(&files));
+    let files = tuning::files(&tuning, &parameters, &source.source, out);
     let controller = &tuning.parameters.controller;
     let worst = tuning.worst();
     let least =
@@ -604,7 +708,7 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
     let text = format!(
         "proportional {:.4} V/m, integral {:.4} V/(m s), derivative {:.4} V s/m\n\
          gain margin {:.2}, phase margin {:.0}°, dead time margin {:.0} ms; sensitivity peak {:.2} on plants that are not quite known,\n\
-         at its worst with {} kg at {:.0} mm\n\n{}",
+         at its worst with {} kg at {:.0} mm\n",
         controller.proportional_gain,
         controller.integral_gain,
         controller.derivative_gain,
@@ -614,29 +718,24 @@ fn tune(source: &ParameterSource, mut masses: Vec<f64>, out: &Path) -> Result<An
         worst.uncertain.sensitivity,
         worst.point.mass,
         1e3 * worst.point.contraction,
-        listed(&files)
     );
-    Ok(Answer { text, json })
+    Ok(Answer { text, json: tuning::to_json(&tuning), files, ..Answer::default() })
 }
 
 fn evaluate_closed_loop(plants: u32, out: &Path) -> Result<Answer> {
     let bar = progress(closed_loop::pieces());
     let evaluation = closed_loop::evaluate(plants as usize, &counting(&bar))?;
     bar.finish_and_clear();
-    let files = export::write_whole(closed_loop::files(&evaluation, out))?;
-    let mut json = closed_loop::to_json(&evaluation);
-    json["files"] = json!(names(&files));
-    Ok(Answer { text: listed(&files), json })
+    let (json, files) = (closed_loop::to_json(&evaluation), closed_loop::files(&evaluation, out));
+    Ok(Answer { json, files, ..Answer::default() })
 }
 
 fn run_reproduction(out: &Path) -> Result<Answer> {
     let bar = progress(reproduction::pieces());
     let found = reproduction::reproduce(&counting(&bar))?;
     bar.finish_and_clear();
-    let files = export::write_whole(reproduction::files(&found, out))?;
-    let mut json = reproduction::to_json(&found);
-    json["files"] = json!(names(&files));
-    Ok(Answer { text: listed(&files), json })
+    let (json, files) = (reproduction::to_json(&found), reproduction::files(&found, out));
+    Ok(Answer { json, files, ..Answer::default() })
 }
 
 fn run_demo(out: &Path) -> Result<Answer> {
@@ -654,14 +753,14 @@ fn run_demo(out: &Path) -> Result<Answer> {
         told = told(&made.diagnosis),
         diagnosis = out.join("diagnosis").display(),
     );
-    Ok(Answer { text, json: json!({ "files": names(&made.files), "diagnosis": report::to_json(&made.diagnosis) }) })
+    let json = json!({ "files": names(&made.files), "diagnosis": report::to_json(&made.diagnosis) });
+    Ok(Answer { text, notes: made.diagnosis.notes, json, ..Answer::default() })
 }
 
 fn export_fmus(parameters: &Parameters, out: &std::path::Path, libraries: &[String]) -> Result<Answer> {
-    let files = export::export(parameters, &package::libraries(libraries)?, out)?;
-    ssp::warnings(parameters).iter().for_each(|note| eprintln!("note: {note}"));
-    let paths = names(&files);
-    Ok(Answer { text: paths.join("\n"), json: json!({ "files": paths }) })
+    let files = export::files(parameters, &package::libraries(libraries)?, out);
+    ssp::warnings(parameters).iter().for_each(|note| say_note(note));
+    Ok(Answer { json: json!({}), files, ..Answer::default() })
 }
 
 /// Rows of named texts, as a table and as JSON.
@@ -674,7 +773,7 @@ fn table(rows: Vec<Vec<(&str, String)>>) -> Answer {
     };
     let text = rows.iter().map(|row| line(row).trim_end().to_owned() + "\n").collect();
     let json = rows.iter().map(|row| row.iter().map(|(key, text)| ((*key).to_owned(), json!(text))).collect());
-    Answer { text, json: Value::Array(json.map(Value::Object).collect()) }
+    Answer { text, json: Value::Array(json.map(Value::Object).collect()), ..Answer::default() }
 }
 
 fn list(what: Listing) -> Answer {
@@ -716,7 +815,7 @@ fn list_effects() -> Answer {
         });
         all.push(Value::Object(object));
     }
-    Answer { text, json: Value::Array(all) }
+    Answer { text, json: Value::Array(all), ..Answer::default() }
 }
 
 fn list_variables() -> Answer {
@@ -746,5 +845,5 @@ fn list_variables() -> Answer {
             all.push(Value::Object(object));
         }
     }
-    Answer { text: table(rows).text, json: Value::Array(all) }
+    Answer { text: table(rows).text, json: Value::Array(all), ..Answer::default() }
 }

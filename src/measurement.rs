@@ -1,7 +1,7 @@
 //! Recordings: columns of a CSV file in SI units.
 
 use crate::start::Motion;
-use crate::{Error, Result};
+use crate::{Error, Result, printable};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -75,7 +75,7 @@ pub enum Between {
 pub struct Recording {
     /// Where it was read from.
     pub path: PathBuf,
-    /// What people call it.
+    /// What people call it, without control characters.
     name: String,
     /// Its number among those that were read together, from 1; `None` where it was read alone.
     number: Option<usize>,
@@ -120,14 +120,21 @@ impl Recording {
     /// # Errors
     /// As [`Recording::read`].
     pub fn parse(text: &[u8], path: &Path, renamed: &[(String, String)]) -> Result<Self> {
+        if text.trim_ascii().is_empty() {
+            return Err(Error::Recording { path: path.to_owned(), problem: "the file is empty".to_owned() });
+        }
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
         let headers = reader.headers().map_err(|error| csv_error(path, &error))?.clone();
         check_headers(path, &headers, renamed)?;
-        let mut notes = Vec::new();
-        let columns = headers
-            .iter()
-            .map(|header| understand(header, path, renamed, &mut notes))
-            .collect::<Result<Vec<Option<Column>>>>()?;
+        let columns =
+            headers.iter().map(|header| understand(header, path, renamed)).collect::<Result<Vec<Option<Column>>>>()?;
+        let unused: Vec<&str> =
+            headers.iter().zip(&columns).filter(|(_, column)| column.is_none()).map(|(header, _)| header).collect();
+        let notes = match unused[..] {
+            [] => Vec::new(),
+            [header] => vec![format!("column `{header}` is not used")],
+            _ => vec![format!("columns {} are not used", listed(&unused))],
+        };
         let mut signals: BTreeMap<Signal, Vec<f64>> = BTreeMap::new();
         for column in columns.iter().flatten() {
             if signals.insert(column.signal, Vec::new()).is_some() {
@@ -136,7 +143,12 @@ impl Recording {
             }
         }
         if !signals.contains_key(&Time) {
-            let problem = "there is no column `time [s]`".to_owned();
+            let all: Vec<&str> = headers.iter().collect();
+            let example = unused.iter().find(|header| !header.is_empty()).unwrap_or(&"clock");
+            let problem = format!(
+                "there is no column `time [s]` among {}: rename one, or say which it is, as in --map \"{example}=time [s]\"",
+                listed(&all)
+            );
             return Err(Error::Csv { path: path.to_owned(), line: 1, column: None, problem });
         }
         let mut lines = Vec::new();
@@ -153,7 +165,7 @@ impl Recording {
             check_time(path, line, signals.get(&Time))?;
         }
         check_mass(path, &lines, signals.get(&LoadMass))?;
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let name = printable(&path.file_name().unwrap_or(path.as_os_str()).to_string_lossy());
         let time = signals.remove(&Time).unwrap_or_default();
         let units = columns.iter().flatten().map(|column| (column.signal, column.unit)).collect();
         Self {
@@ -193,30 +205,46 @@ impl Recording {
             let mut keep = fresh.iter();
             self.lines.retain(|_| *keep.next().unwrap_or(&true));
         }
-        let problem = |problem: &str| Error::Recording { path: self.path.clone(), problem: problem.to_owned() };
+        let problem = |problem: String| Error::Recording { path: self.path.clone(), problem };
+        if self.time.len() < FEWEST_SAMPLES && repeated > 0 {
+            let left = self.time.len();
+            return Err(problem(format!(
+                "{repeated} rows repeat the time of the row before, which leaves {left}: write the time with more digits"
+            )));
+        }
         if self.time.len() < FEWEST_SAMPLES {
-            return Err(problem("fewer than 10 samples: record longer, or check the separator (a comma is needed)"));
+            let text = "fewer than 10 samples: record longer, or check the separator (a comma is needed)";
+            return Err(problem(text.to_owned()));
         }
         if self.signals.contains_key(&LoadMass) && self.load_mass().is_none() {
-            return Err(problem("column `load_mass` is empty"));
+            return Err(problem("column `load_mass` is empty".to_owned()));
         }
         let missing = |signal: Signal| self.get(signal).is_none_or(|values| values.iter().all(|v| v.is_nan()));
-        let complaint = if self.load_mass().is_some() {
+        // What is needed, and the columns that would do.
+        let complaint: Option<(&str, &[Signal])> = if self.load_mass().is_some() {
             if missing(Command) {
-                Some("a hanging load (`load_mass`) needs the column `command [V]`")
+                Some(("a hanging load (`load_mass`) needs the column `command [V]`", &[Command]))
             } else if missing(GaugePressure) && missing(Contraction) && missing(Force) {
-                Some("none of `gauge_pressure`, `contraction`, `force` was measured: there is nothing to compare with")
+                let text =
+                    "none of `gauge_pressure`, `contraction`, `force` was measured: there is nothing to compare with";
+                Some((text, &[GaugePressure, Contraction, Force]))
             } else {
                 None
             }
         } else if missing(Contraction) {
-            Some("without `load_mass` the motion is prescribed and the column `contraction [m]` is needed")
+            let text = "without `load_mass` the motion is prescribed and the column `contraction [m]` is needed";
+            Some((text, &[Contraction]))
         } else if missing(Command) && missing(GaugePressure) {
-            Some("without `load_mass` either `command [V]` or `gauge_pressure [Pa]` is needed")
+            let text = "without `load_mass` either `command [V]` or `gauge_pressure [Pa]` is needed";
+            Some((text, &[Command, GaugePressure]))
         } else {
             None
         };
-        complaint.map_or(Ok(()), |text| Err(problem(text)))?;
+        if let Some((text, would_do)) = complaint {
+            let empty = would_do.iter().find(|signal| self.get(**signal).is_some());
+            let empty = empty.map_or(String::new(), |signal| format!("column `{}` is empty: ", signal.name()));
+            return Err(problem(format!("{empty}{text}")));
+        }
         let contraction = self.bridged(Contraction).filter(|_| self.load_mass().is_some());
         self.motion = contraction.and_then(|contraction| Motion::shown_by(&self.time, &contraction));
         if let Some(Motion { contraction, velocity, .. }) = self.motion {
@@ -298,7 +326,7 @@ impl Recording {
         let command = self.bridged(Command).filter(|_| self.between != Between::Lines);
         let jumps = command.map(|command| self.far_jumps(&command)).unwrap_or_default();
         let alone = self.alone(every);
-        let stays = |k: &usize| k % every == 0 || jumps.contains(k) || alone.contains(k);
+        let stays = |k: &usize| k.is_multiple_of(every) || jumps.contains(k) || alone.contains(k);
         let kept: Vec<usize> = (0..self.time.len()).filter(stays).collect();
         let picked = |values: &[f64]| kept.iter().map(|k| values[*k]).collect();
         let weights = |position: usize| -> Vec<(usize, f64)> {
@@ -338,7 +366,7 @@ impl Recording {
         let cells = || (0..self.time.len()).step_by(every).map(|first| first..self.time.len().min(first + every));
         let of_signal = |values: &Vec<f64>| {
             let shown: Vec<usize> = cells().filter_map(|mut cell| cell.find(|k| !values[*k].is_nan())).collect();
-            let late = |k: &usize| k % every != 0;
+            let late = |k: &usize| !k.is_multiple_of(every);
             let is_mostly_late = 2 * shown.iter().filter(|k| late(k)).count() > shown.len();
             shown.into_iter().filter(move |k| is_mostly_late && late(k)).collect::<Vec<_>>()
         };
@@ -554,17 +582,17 @@ impl Recording {
 /// # Errors
 /// As [`Recording::read`]; [`Error::Recording`] for a file that is given twice.
 pub fn read_all(paths: &[PathBuf], renamed: &[(String, String)]) -> Result<Vec<Recording>> {
-    for (index, path) in paths.iter().enumerate() {
-        if paths[..index].contains(path) {
-            let problem = "is given twice: a copy proves nothing about the original".to_owned();
-            return Err(Error::Recording { path: path.clone(), problem });
-        }
+    // However it is spelt, a file is the same; what is not there is named when it is read.
+    let files: Vec<PathBuf> = paths.iter().map(|path| path.canonicalize().unwrap_or_else(|_| path.clone())).collect();
+    if let Some(index) = (1..files.len()).find(|index| files[..*index].contains(&files[*index])) {
+        let problem = "is given twice: a copy proves nothing about the original".to_owned();
+        return Err(Error::Recording { path: paths[index].clone(), problem });
     }
     let mut recordings = paths.iter().map(|path| Recording::read(path, renamed)).collect::<Result<Vec<_>>>()?;
     let names: Vec<String> = recordings.iter().map(Recording::name).collect();
     for recording in &mut recordings {
         if names.iter().filter(|name| **name == recording.name).count() > 1 {
-            recording.name = recording.path.display().to_string();
+            recording.name = printable(&recording.path.display().to_string());
         }
     }
     Ok(numbered(recordings))
@@ -599,7 +627,11 @@ impl Column {
             return Ok(f64::NAN);
         }
         match cell.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number * self.scale + self.offset),
+            Ok(number) if number.is_finite() => {
+                let value = number * self.scale + self.offset;
+                let problem = || format!("{cell} {} is more than a computer can count: correct it", self.unit);
+                value.is_finite().then_some(value).ok_or_else(|| self.error(path, line, problem()))
+            }
             _ => {
                 Err(self.error(path, line, format!("`{cell}` is not a number; leave the cell empty if it is missing")))
             }
@@ -607,13 +639,16 @@ impl Column {
     }
 }
 
+/// Headers in a message: the first ten, and how many more there are.
+fn listed(headers: &[&str]) -> String {
+    const SHOWN: usize = 10;
+    let quoted: Vec<String> = headers.iter().take(SHOWN).map(|header| format!("`{header}`")).collect();
+    let more = headers.len().saturating_sub(SHOWN);
+    quoted.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+}
+
 /// What a header means; `None` for a column that is of no use here.
-fn understand(
-    header: &str,
-    path: &Path,
-    renamed: &[(String, String)],
-    notes: &mut Vec<String>,
-) -> Result<Option<Column>> {
+fn understand(header: &str, path: &Path, renamed: &[(String, String)]) -> Result<Option<Column>> {
     let header = header.trim_start_matches('\u{feff}');
     let ours = renamed.iter().find(|(theirs, _)| theirs == header).map_or(header, |(_, ours)| ours);
     let (name, unit) = match ours.split_once('[') {
@@ -629,7 +664,6 @@ fn understand(
                 known.join(", ")
             )));
         }
-        notes.push(format!("column `{header}` is not used"));
         return Ok(None);
     };
     let known = units.iter().map(|(symbol, _)| *symbol).collect::<Vec<_>>().join(", ");
@@ -649,7 +683,10 @@ fn check_headers(path: &Path, headers: &csv::StringRecord, renamed: &[(String, S
     }
     let known = |theirs: &String| headers.iter().any(|header| header.trim_start_matches('\u{feff}') == theirs);
     match renamed.iter().find(|(theirs, _)| !known(theirs)) {
-        Some((theirs, _)) => fail(format!("there is no column `{theirs}`, which --map names")),
+        Some((theirs, _)) => fail(format!(
+            "there is no column `{theirs}`, which --map names; there are {}",
+            listed(&headers.iter().collect::<Vec<_>>())
+        )),
         None => Ok(()),
     }
 }
@@ -688,7 +725,7 @@ fn csv_error(path: &Path, error: &csv::Error) -> Error {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
             format!("{len} cells where the header has {expected_len}: the file is cut off or a separator is missing")
         }
-        csv::ErrorKind::Utf8 { .. } => "not UTF-8 text".to_owned(),
+        csv::ErrorKind::Utf8 { .. } => "not UTF-8 text: save the file as UTF-8".to_owned(),
         _ => "not a CSV file".to_owned(),
     };
     Error::Csv { path: path.to_owned(), line, column: None, problem }
@@ -858,6 +895,33 @@ mod tests {
     }
 
     #[test]
+    fn a_file_is_the_same_however_it_is_spelt() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.csv");
+        std::fs::write(&path, rows("time [s],command [V],contraction [m]", |k| format!("{k},1,0.1"))).unwrap();
+        std::fs::create_dir(folder.path().join("x")).unwrap();
+        let again = folder.path().join("x").join("..").join("r.csv");
+        let refused = read_all(&[path, again.clone()], &[]).unwrap_err().to_string();
+        assert!(refused.starts_with(&format!("{}: is given twice", again.display())), "{refused}");
+    }
+
+    #[test]
+    fn a_name_stays_on_its_line() {
+        let text = rows("time [s],command [V],contraction [m]", |k| format!("{k},1,0.1"));
+        let recording = Recording::parse(text.as_bytes(), Path::new("a\n[load]\nmass = 1.csv"), &[]).unwrap();
+        assert_eq!(recording.name(), "a\\n[load]\\nmass = 1.csv");
+    }
+
+    #[test]
+    fn many_columns_without_use_are_one_note() {
+        let header =
+            (0..5000).fold("time [s],command [V],contraction [m]".to_owned(), |text, k| text + &format!(",x{k}"));
+        let text = rows(&header, |k| format!("{k},1,0.1{}", ",7".repeat(5000)));
+        let all = "`x0`, `x1`, `x2`, `x3`, `x4`, `x5`, `x6`, `x7`, `x8`, `x9` and 4990 more";
+        assert_eq!(parse(&text).unwrap().notes, [format!("columns {all} are not used")]);
+    }
+
+    #[test]
     fn foreign_headers_can_be_renamed() {
         let text = rows("t,u,x", |k| format!("{k},1,0.1"));
         let map = [("t", "time [s]"), ("u", "command [V]"), ("x", "contraction [m]")]
@@ -890,10 +954,26 @@ mod tests {
                 rows(header, |k| if k == 2 { "2,abc,1,20".into() } else { row(k) }),
                 "r.csv: line 4, column `command [V]`: `abc`",
             ),
+            (
+                rows(&header.replace("[m]", "[kN]").replace("contraction", "force"), |k| format!("{k},1,1e306,20")),
+                "r.csv: line 2, column `force [kN]`: 1e306 kN is more than",
+            ),
             (rows(header, |k| format!("{k},1,0.1,-5")), "r.csv: line 2, column `load_mass`: -5 kg"),
             (rows(header, |k| format!("{k},1,0.1,{}", 20 + k)), "r.csv: line 3, column `load_mass`: the load changes"),
             (rows("time [s],command [V]", |k| format!("{k},1")), "r.csv: without `load_mass` the motion is prescribed"),
             ("time [s],command [V]\n".to_owned(), "r.csv: fewer than 10 samples"),
+            (
+                rows(header, |_| row(3)),
+                "r.csv: 11 rows repeat the time of the row before, which leaves 1: write the time with more digits",
+            ),
+            (rows(header, |k| format!("{k},,0.1,20")), "r.csv: column `command` is empty: a hanging load"),
+            (rows("time [s],contraction [m]", |k| format!("{k},")), "r.csv: column `contraction` is empty: without"),
+            (
+                rows("clock,command [V]", |k| format!("{k},1")),
+                "r.csv: line 1: there is no column `time [s]` among `clock`, `command [V]`: rename one, or say which it \
+                 is, as in --map \"clock=time [s]\"",
+            ),
+            (" \n\n".to_owned(), "r.csv: the file is empty"),
         ];
         for (text, expected) in cases {
             let message = parse(&text).unwrap_err().to_string();

@@ -19,6 +19,10 @@ pub const EMBEDDED_PLATFORM: &str = env!("SINEW_EMBEDDED_PLATFORM");
 const PLATFORMS: &[(&str, &str)] =
     &[("linux64", "so"), ("linux32", "so"), ("win64", "dll"), ("win32", "dll"), ("darwin64", "dylib")];
 
+/// Bytes with which a shared library begins, by its extension: ELF, PE, Mach-O of 64 bit or of several processors.
+const BEGINNINGS: [(&str, &[u8]); 4] =
+    [("so", b"\x7fELF"), ("dll", b"MZ"), ("dylib", b"\xcf\xfa\xed\xfe"), ("dylib", b"\xca\xfe\xba\xbe")];
+
 /// The FMU library for one platform.
 #[derive(Debug, Clone)]
 pub struct Library {
@@ -39,11 +43,15 @@ impl Library {
     /// A library from `PLATFORM=FILE`.
     ///
     /// # Errors
-    /// [`Error::Platform`], [`Error::Io`].
+    /// [`Error::Platform`], [`Error::Io`], [`Error::NoLibrary`] for another file than a library for the platform.
     pub fn from_argument(argument: &str) -> Result<Self> {
         let (platform, file) = argument.split_once('=').ok_or(Error::Platform { argument: argument.to_owned() })?;
         let bytes = std::fs::read(file).map_err(|source| Error::Io { path: file.into(), source })?;
-        Self::new(platform, bytes)
+        let library = Self::new(platform, bytes)?;
+        let begins =
+            |(extension, start): &(&str, &[u8])| *extension == library.extension && library.bytes.starts_with(start);
+        let no_library = || Error::NoLibrary { path: file.into(), platform: library.platform };
+        if BEGINNINGS.iter().any(begins) { Ok(library) } else { Err(no_library()) }
     }
 
     fn new(platform: &str, bytes: Vec<u8>) -> Result<Self> {
@@ -169,5 +177,28 @@ pub(crate) fn short(value: f64) -> String {
         }
         ..0 => format!("{value:.0}"),
         _ => format!("{value:.3e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_library_for_its_platform_is_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("library");
+        let given = |platform: &str, bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            Library::from_argument(&format!("{platform}={}", path.display())).map_err(|error| error.to_string())
+        };
+        for (platform, bytes) in [("linux64", &b"\x7fELF\x02"[..]), ("win32", b"MZ"), ("darwin64", b"\xcf\xfa\xed\xfe")]
+        {
+            given(platform, bytes).unwrap();
+            let refused = given(platform, b"# Sinew").unwrap_err();
+            let expected = format!("{}: no shared library for {platform}", path.display());
+            assert!(refused.starts_with(&expected), "{refused}");
+        }
+        given("win64", b"\x7fELF\x02").unwrap_err();
     }
 }

@@ -164,10 +164,14 @@ impl Parameters {
     /// The parameters of a preset, or else of a TOML file, which starts from the defaults.
     ///
     /// # Errors
-    /// [`Error::UnknownPreset`] where there is neither; otherwise as [`Parameters::apply_toml`].
+    /// [`Error::UnknownPreset`] where there is neither; [`Error::Io`]; otherwise as [`Parameters::apply_toml`].
     pub fn load(source: &str) -> Result<Self> {
         let path = std::path::Path::new(source);
-        if !path.is_file() {
+        if path.is_dir() {
+            let no_file = || std::io::Error::other("is a folder: give a TOML file in it, or a preset");
+            return Self::preset(source).map_err(|_| Error::Io { path: path.to_owned(), source: no_file() });
+        }
+        if !path.exists() {
             return Self::preset(source);
         }
         let text = std::fs::read_to_string(path).map_err(|error| Error::Io { path: path.to_owned(), source: error })?;
@@ -190,7 +194,10 @@ impl Parameters {
         let in_file =
             |problem| Error::ParameterFile { source_name: source_name.to_owned(), problem: Box::new(problem) };
         let mut changed = match table.get("preset") {
-            Some(toml::Value::String(name)) => Self::preset(name).map_err(in_file)?,
+            Some(toml::Value::String(name)) => Self::preset(name).map_err(|_| {
+                let expected = "the name of a preset and of no file (`sinew list presets` shows all)".to_owned();
+                in_file(Error::WrongKind { name: "preset".to_owned(), expected, found: name.clone() })
+            })?,
             Some(other) => {
                 let (name, expected) = ("preset".to_owned(), "the name of a preset".to_owned());
                 return Err(in_file(Error::WrongKind { name, expected, found: other.type_str().to_owned() }));
@@ -327,6 +334,10 @@ mod tests {
                  mooney-rivlin, spring, three-element, not `x`",
             ),
             ("[load]\nmass = \"x\"", "f.toml: `load.mass` takes a number, not `x`"),
+            (
+                "preset = \"p/int.toml\"",
+                "f.toml: `preset` takes the name of a preset and of no file (`sinew list presets` shows all), not `p/int.toml`",
+            ),
             ("[load]\nmass = true", "f.toml: `load.mass` takes a number or a name, not `boolean`"),
         ] {
             let mut parameters = Parameters::default();
@@ -334,6 +345,8 @@ mod tests {
             assert_eq!(message, expected);
             assert_eq!(parameters, Parameters::default());
         }
+        let folder = Parameters::load(env!("CARGO_MANIFEST_DIR")).unwrap_err().to_string();
+        assert!(folder.ends_with("is a folder: give a TOML file in it, or a preset"), "{folder}");
         let message = Parameters::default().apply_toml("[load]\n\nmass = = 3", "f.toml").unwrap_err().to_string();
         assert!(message.starts_with("f.toml: line 3: "), "{message}");
     }

@@ -157,3 +157,13 @@ fn slow_trajectories_pass_where_the_muscle_rests_and_fast_ones_lag() {
     println!("inertia explains up to {most} m");
     assert!(ahead < most, "{ahead} against {most}");
 }
+
+#[test]
+fn names_are_no_markup() {
+    let mut strange = muscle("dmsp_20_300");
+    strange.name = "<img src=x>|&".to_owned();
+    let models = &all_models()[..1];
+    let text = report::markdown(&compare(vec![strange, muscle("dmsp_10_250")], models).unwrap());
+    assert!(!text.contains("<img") && text.contains("## &lt;img src=x>|&amp;\n"), "{text}");
+    assert!(text.contains("| &lt;img src=x>\\|&amp; |"), "{text}");
+}

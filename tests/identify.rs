@@ -239,3 +239,14 @@ fn written_parameters_read_back() {
     assert!(text.contains("; fitted, "), "{text}");
     assert_eq!(text, report::to_toml(&identify(&recording("nominal_40kg.csv"), &given, None, Braid::Fitted).unwrap()));
 }
+
+#[test]
+fn no_model_is_praised_where_nothing_could_be_left_out() {
+    let model = Some(ForceModelName::VirtualArea);
+    let mut found = identify(&recording("nominal_40kg.csv"), &Parameters::default(), model, Braid::Given).unwrap();
+    found.rivals = ["virtual-area", "spring"].map(|name| (name.to_owned(), f64::INFINITY)).into();
+    let said = report::sentences(&found).join("\n");
+    let expected =
+        "No model can be trusted: the points allow none to be left out, by which virtual-area would be judged.";
+    assert!(said.contains(expected) && !said.contains(" inf "), "{said}");
+}

@@ -79,3 +79,66 @@ fn limits_that_leave_nothing_are_refused_with_a_sentence() {
     let refused = plan::plan(&task.unwrap(), &Parameters::default(), DEFAULT_TOLERANCE, &limits, &|_| ()).unwrap_err();
     assert!(refused.to_string().contains("the limits leave no experiment"), "{refused}");
 }
+
+/// What is said of a diagnosis in which a value was changed.
+fn refusal(change: impl Fn(&mut serde_json::Value)) -> String {
+    let mut diagnosis = serde_json::json!({
+        "verdict": "explained", "tolerance": 0.03, "signals": { "contraction": { "noise_rms": 1e-4 } },
+        "causes": [{ "effect": "creep", "alternatives": ["leakage"], "parameters": {}, "rivals": { "leakage": { "leakage.rate": 0.1 } } }],
+    });
+    change(&mut diagnosis);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("diagnosis.json");
+    std::fs::write(folder.path().join("extended.toml"), "").unwrap();
+    std::fs::write(&path, format!("\u{feff}{diagnosis}")).unwrap();
+    let said =
+        Task::of_diagnosis(&path, &Parameters::default()).map_or_else(|error| error.to_string(), |_| String::new());
+    said.replace(&path.display().to_string(), "FILE")
+}
+
+#[test]
+fn a_diagnosis_that_does_not_fit_is_refused_by_file_and_key() {
+    use serde_json::{Value, json};
+    assert_eq!(refusal(|_| ()), "");
+    let cases: [(&str, Value, &str); 12] = [
+        ("/tolerance", json!(-1), "`tolerance`: a share between 0 and 1 belongs here, not -1"),
+        ("/tolerance", json!(1e9), "`tolerance`: a share"),
+        ("/tolerance", json!("x"), "`tolerance`: a number belongs here, not \"x\""),
+        ("/verdict", json!("foo"), "`verdict`: there is no verdict \"foo\""),
+        ("/causes", Value::Null, "`causes`: a list belongs here, not nothing"),
+        ("/causes", json!("friction"), "`causes`: a list belongs here"),
+        ("/causes/0/effect", json!("nope"), "`causes[0].effect`: there is no effect `nope`"),
+        ("/causes/0/alternatives/0", json!("nope"), "`causes[0].alternatives`: there is no effect `nope`"),
+        ("/causes/0/rivals/leakage/leakage.rate", Value::Null, "`causes[0].rivals.leakage.leakage.rate`: a number"),
+        (
+            "/causes/0/rivals/leakage/leakage.rate",
+            json!(-1e9),
+            "`causes[0].rivals.leakage.leakage.rate`: `leakage.rate` is",
+        ),
+        ("/signals/contraction/noise_rms", json!(0), "`signals.contraction.noise_rms`: a number above 0"),
+        ("/signals/contraction/noise_rms", json!("x"), "`signals.contraction.noise_rms`: a number belongs"),
+    ];
+    for (place, value, expected) in cases {
+        let said = refusal(|diagnosis| *diagnosis.pointer_mut(place).unwrap() = value.clone());
+        assert!(said.starts_with(&format!("FILE: {expected}")), "{said} should start with {expected}");
+    }
+}
+
+#[test]
+fn an_earlier_plan_goes_but_not_what_was_recorded_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, header: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, format!("{header}\n")).unwrap();
+        path
+    };
+    let unplayed = write("plan-1.csv", "time [s],command [V],load_mass [kg]");
+    let shown = write("plan-1-command.svg", "<svg/>");
+    write("plan-2.csv", "time [s],command [V],load_mass [kg],force [N]");
+    write("plan-2-command.svg", "<svg/>");
+    write("plan-3.csv", "mine");
+    let kept = write("plan.csv", "time [s],command [V],load_mass [kg]");
+    let mut found = plan::outdated(folder.path(), &[(kept, Vec::new())]);
+    found.sort();
+    assert_eq!(found, [shown, unplayed]);
+}

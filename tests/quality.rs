@@ -3,7 +3,7 @@
 use sinew::Result;
 use sinew::measurement::Recording;
 use sinew::parameters::Parameters;
-use sinew::quality::notes;
+use sinew::quality::{notes, notes_on_units};
 use std::path::Path;
 
 const HANGING: &str = "nominal_40kg.csv";
@@ -77,6 +77,9 @@ fn contradictory_units_are_refused_with_the_likely_one() {
     for (name, header, wrong, proposal) in cases {
         let refused = found(&[recording(name, &[(header, wrong)], |_, _, _, value| value)]).unwrap_err().to_string();
         assert_says(&refused, &[name, &format!("`{wrong}`"), proposal, &format!("write `{header}`")]);
+        let of_units =
+            notes_on_units(&[recording(name, &[(header, wrong)], |_, _, _, value| value)], &Parameters::default());
+        assert_eq!(of_units.unwrap_err().to_string(), refused);
     }
     // The other way round: numbers of a smaller unit under the header of a larger one.
     for (name, column, factor, proposal) in [

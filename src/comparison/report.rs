@@ -235,7 +235,8 @@ pub fn markdown(found: &Comparison) -> String {
             write_table(&mut text, &CROSS_HEADER, &own);
         }
     }
-    text
+    // Names of files are no markup.
+    text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 const SIGN: &str = "The thesis finds that the error of `improved-mckibben` keeps a sign, opposite in the two directions. At least 80 % of \
@@ -247,11 +248,13 @@ fn capital(word: &str) -> String {
 }
 
 fn write_table(text: &mut String, header: &[&str], rows: &[Vec<String>]) {
-    let _ = writeln!(text, "| {} |", header.join(" | "));
+    let line = |cells: &[&str]| {
+        let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    *text += &line(header);
     let _ = writeln!(text, "|---|{}", "---:|".repeat(header.len() - 1));
-    rows.iter().for_each(|row| {
-        let _ = writeln!(text, "| {} |", row.join(" | "));
-    });
+    rows.iter().for_each(|row| *text += &line(&row.iter().map(String::as_str).collect::<Vec<_>>()));
     text.push('\n');
 }
 

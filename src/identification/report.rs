@@ -46,13 +46,19 @@ pub fn sentences(found: &Identification) -> Vec<String> {
             held.rms, held.blocks
         ));
     }
-    if let Some((_, best)) = found.rivals.first() {
-        let next =
-            found.rivals.get(1).map_or(String::new(), |(label, rms)| format!("; next is {label} with {rms:.1} N"));
-        said.push(format!(
-            "It is the model of {} with the smallest held-out error, {best:.1} N{next}.",
-            found.rivals.len()
-        ));
+    match found.rivals.first() {
+        Some((label, best)) if best.is_infinite() => said.push(format!(
+            "No model can be trusted: the points allow none to be left out, by which {label} would be judged."
+        )),
+        Some((_, best)) => {
+            let next = found.rivals.get(1).filter(|(_, rms)| rms.is_finite());
+            let next = next.map_or(String::new(), |(label, rms)| format!("; next is {label} with {rms:.1} N"));
+            said.push(format!(
+                "It is the model of {} with the smallest held-out error, {best:.1} N{next}.",
+                found.rivals.len()
+            ));
+        }
+        None => {}
     }
     said.extend(
         fitted

@@ -30,6 +30,19 @@ pub fn notes(recordings: &[Recording], parameters: &Parameters) -> Result<Vec<St
     Ok(notes)
 }
 
+/// The part of [`notes`] on units and signs: what matters whatever the recordings are for.
+///
+/// # Errors
+/// As [`notes`].
+pub fn notes_on_units(recordings: &[Recording], parameters: &Parameters) -> Result<Vec<String>> {
+    let mut notes = Vec::new();
+    for recording in recordings {
+        let found = units::notes(recording, parameters)?;
+        notes.extend(found.into_iter().map(|note| format!("{}: {note}", recording.name())));
+    }
+    Ok(notes)
+}
+
 /// A column whose values a sensor shows: everything but the command, and a contraction that is prescribed.
 fn is_measured(recording: &Recording, signal: Signal) -> bool {
     match signal {

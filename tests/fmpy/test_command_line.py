@@ -61,6 +61,15 @@ def test_bad_recording_is_refused(sinew, tmp_path, command, change, named):
     assert not out.exists()
 
 
+@pytest.mark.parametrize("command", ["simulate", "identify", "compare", "hammerstein", "diagnose"])
+def test_wrong_unit_is_refused(sinew, tmp_path, command):
+    text = (ROOT / "data" / "nominal_40kg.csv").read_text()
+    path = tmp_path / "wrong.csv"
+    path.write_text(text.replace("gauge_pressure [bar]", "gauge_pressure [Pa]"))
+    message = refusal(sinew, command, path, "--out", tmp_path / "out")
+    assert str(path) in message and "write `gauge_pressure [bar]`" in message
+
+
 def test_repeated_time_is_left_out_and_said(sinew, tmp_path):
     path = recording(tmp_path / "repeated.csv", rows=replaced(20, "0.19,2.0,2.0,100.0,392.4,40"))
     done = run(sinew, "simulate", path, "--out", tmp_path / "out")
@@ -75,6 +84,16 @@ def test_simulation_says_how_far_off_it_is(sinew, tmp_path):
     assert errors.keys() == {"gauge_pressure", "contraction", "force"}
     assert 0.0 < errors["gauge_pressure"] < 1e3 and 0.0 < errors["contraction"] < 3e-3 and 0.0 < errors["force"] < 10.0
     assert sorted(str(path) for path in tmp_path.iterdir()) == sorted(answer["files"])
+
+
+def test_diagnosis_says_its_notes_to_people_and_machines(sinew, tmp_path):
+    path = tmp_path / "short.csv"
+    path.write_text("".join((ROOT / "data" / "nominal_40kg.csv").read_text().splitlines(keepends=True)[:1200]))
+    told = run(sinew, "diagnose", path, "--out", tmp_path / "out")
+    answer = run(sinew, "diagnose", path, "--out", tmp_path / "out", "--json")
+    notes = json.loads(answer.stdout)["notes"]
+    assert notes and all(f"note: {note}" in told.stderr.splitlines() for note in notes)
+    assert not any(note in answer.stderr for note in notes)
 
 
 def test_diagnosis_of_next_to_nothing_stays_finite(sinew, tmp_path):
@@ -115,8 +134,10 @@ def test_bad_parameters_are_refused(sinew, tmp_path, text, named):
     ("export", "--parameters", "absent.toml"),
     ("export", "--library", "linux64=absent.so"),
     ("export", "--library", "amiga=README.md"),
+    ("export", "--library", f"linux64={ROOT / 'README.md'}"),
     ("simulate", "absent.csv"),
     ("diagnose", "absent.csv"),
+    ("plan", "absent.json"),
 ], ids=" ".join)
 def test_what_is_not_there_is_named(sinew, tmp_path, arguments):
     message = refusal(sinew, *arguments, "--out", tmp_path / "out")
@@ -135,6 +156,21 @@ def test_unwritable_folder_is_refused(sinew, tmp_path, command):
     assert (tmp_path / "file").read_text() == "in the way"
 
 
+def test_what_was_read_is_not_overwritten(sinew, tmp_path):
+    (own := tmp_path / "out").mkdir()
+    simulated = recording(own / "simulated.csv")
+    (tmp_path / "link.csv").symlink_to(simulated)
+    parameters, nominal = (write_parameters(own / name, {}) for name in ("parameters.toml", "nominal.toml"))
+    before = {path: path.read_text() for path in (simulated, parameters, nominal)}
+    for command in [("simulate", simulated), ("simulate", tmp_path / "link.csv"), ("tune", "--parameters", parameters),
+                    ("diagnose", simulated), ("diagnose", recording(tmp_path / "r.csv"), "--parameters", nominal)]:
+        message = refusal(sinew, *command, "--out", own)
+        assert "would overwrite" in message and "--out" in message and str(own) in message
+    assert {path: path.read_text() for path in own.iterdir()} == before
+    for _ in range(2):
+        run(sinew, "simulate", simulated, "--out", tmp_path / "other")
+
+
 def test_failing_halfway_leaves_nothing(sinew, tmp_path):
     """The last of the four FMUs cannot be written: a folder has its name."""
     (tmp_path / f"{MODELS[-1]}.fmu").mkdir()
@@ -144,7 +180,10 @@ def test_failing_halfway_leaves_nothing(sinew, tmp_path):
 
 
 @pytest.mark.parametrize("arguments", [(), ("exprot",), ("export", "--nonsense"), ("list",), ("list", "everything"),
-                                       ("simulate",)], ids=lambda a: " ".join(a) or "nothing")
+                                       ("simulate",), ("plan", "--effects", "creep,creep"), ("plan", "--effects", ""),
+                                       ("compare", "--muscle", "dmsp-40-290=a.csv", "--parameters", "dmsp-40-290"),
+                                       ("plan", "--effects", "creep"), ("plan", "--effects", "creep,nope")],
+                         ids=lambda a: " ".join(a) or "nothing")
 def test_wrong_usage_is_two(sinew, arguments):
     done = subprocess.run([sinew, *arguments], capture_output=True, text=True)
     assert done.returncode == 2
@@ -176,7 +215,13 @@ def test_output_may_be_cut_off(sinew):
     os.close(reader)
     done = subprocess.run([sinew, "list", "variables"], stdout=writer, stderr=subprocess.PIPE, text=True)
     os.close(writer)
-    assert "panicked" not in done.stderr
+    assert done.returncode == 0 and "panicked" not in done.stderr
+
+
+def test_lost_output_is_a_failure(sinew):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sinew, "list", "effects"], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and "standard output" in done.stderr
 
 
 def test_binary_alone_exports(sinew, tmp_path):

@@ -25,13 +25,32 @@ pub fn files(plan: &Plan, nominal: &Parameters, folder: &Path) -> Vec<(PathBuf, 
     files
 }
 
+/// Files of an earlier plan in `folder` that a new one does not replace; a recording that was filled in, and its pictures, are none.
+pub fn outdated(folder: &Path, new: &[(PathBuf, Vec<u8>)]) -> Vec<PathBuf> {
+    let unplayed = |stem: &&str| {
+        let text = std::fs::read_to_string(folder.join(format!("{stem}.csv"))).unwrap_or_default();
+        text.lines().next().is_none_or(|header| HEADERS.contains(&header))
+    };
+    let of_run = |stem: &str| {
+        let shown = OUTPUTS.map(Signal::name).into_iter().chain(["command"]);
+        shown.map(|name| format!("{stem}-{name}.svg")).chain([format!("{stem}.csv")]).collect::<Vec<_>>()
+    };
+    let all = STEMS.into_iter().filter(unplayed).flat_map(of_run).map(|name| folder.join(name));
+    all.filter(|path| path.is_file() && new.iter().all(|(other, _)| other != path)).collect()
+}
+
+/// Names of the files of a single run, and of those of a pair.
+pub(super) const STEMS: [&str; 3] = ["plan", "plan-1", "plan-2"];
+/// Headers of a recording that is yet to be made: under a hanging load, and at a fixed length.
+const HEADERS: [&str; 2] = ["time [s],command [V],load_mass [kg]", "time [s],command [V],contraction [m]"];
+
 /// The command to play, with what stays constant.
 fn csv(run: &Planned) -> String {
     let (header, constant) = match (run.place.load_mass(), run.locked) {
-        (Some(mass), _) => ("load_mass [kg]", mass),
-        (None, contraction) => ("contraction [m]", contraction.unwrap_or_default()),
+        (Some(mass), _) => (HEADERS[0], mass),
+        (None, contraction) => (HEADERS[1], contraction.unwrap_or_default()),
     };
-    let mut text = format!("time [s],command [V],{header}\n");
+    let mut text = format!("{header}\n");
     for (time, command) in run.time.iter().zip(&run.command) {
         let _ = writeln!(text, "{time:.2},{command:.4},{constant}");
     }

@@ -12,7 +12,7 @@ mod power;
 mod rivals;
 
 pub use excitations::EXCITATIONS;
-pub use files::{files, matrix, to_json};
+pub use files::{files, matrix, outdated, to_json};
 pub use rivals::{Rival, Task};
 
 use super::hypothesis::{Off, corrections};
@@ -112,7 +112,7 @@ impl Need {
     }
 }
 
-/// An experiment: one run or several that belong together.
+/// An experiment: one run, or two that belong together.
 #[derive(Debug, Clone)]
 struct Experiment {
     runs: Vec<usize>,
@@ -372,7 +372,7 @@ impl Choice {
             let run = &bank.runs[*run];
             let input = |signal: Signal| run.recording.get(signal).map(<[f64]>::to_vec);
             Planned {
-                file: if several { format!("plan-{}.csv", k + 1) } else { "plan.csv".to_owned() },
+                file: format!("{}.csv", files::STEMS[if several { k + 1 } else { 0 }]),
                 excitation: run.excitation,
                 place: run.place,
                 time: halved(&run.recording.time),
