@@ -228,7 +228,7 @@ impl<'a> Data<'a> {
     /// Mean square of the structural error of a sound nominal muscle relative to that of the noise. What comes before the
     /// muscle has none: the declared tolerance is one of the muscle.
     pub fn structure(&self, signal: Signal) -> f64 {
-        if signal == Signal::GaugePressure { 0.0 } else { self.share_of_span(signal) }
+        self.mean_of_samples(signal, |segment| self.structure_in(segment))
     }
 
     /// The same in one recording.
@@ -238,8 +238,13 @@ impl<'a> Data<'a> {
 
     /// Mean square of an error that is in each recording as large a share of the span of a signal, of whichever; relative to that of the noise.
     pub fn share_of_span(&self, signal: Signal) -> f64 {
+        self.mean_of_samples(signal, |segment| self.share_of_own_span(segment))
+    }
+
+    /// Mean over all samples of a signal of what is the same for those of a recording.
+    fn mean_of_samples(&self, signal: Signal, value: impl Fn(&Segment) -> f64) -> f64 {
         let of_signal = || self.segments.iter().filter(|segment| segment.signal == signal);
-        let sum: f64 = of_signal().map(|s| s.samples.len() as f64 * self.share_of_own_span(s)).sum();
+        let sum: f64 = of_signal().map(|segment| segment.samples.len() as f64 * value(segment)).sum();
         sum / of_signal().map(|segment| segment.samples.len() as f64).sum::<f64>()
     }
 

@@ -18,13 +18,12 @@ use crate::parameters::Parameters;
 /// [`crate::Error::Recording`] where two columns contradict each other, or a column contradicts the muscle, by so much
 /// that only a wrong unit can be the reason.
 pub fn notes(recordings: &[Recording], parameters: &Parameters) -> Result<Vec<String>> {
-    let mut notes = Vec::new();
-    for recording in recordings {
+    let mut notes = of_each(recordings, |recording| {
         let mut found = units::notes(recording, parameters)?;
         found.extend(sampling::notes(recording, parameters));
         found.extend(sensors::notes(recording, parameters));
-        notes.extend(found.into_iter().map(|note| format!("{}: {note}", recording.name())));
-    }
+        Ok(found)
+    })?;
     notes.extend(sensors::copied_recordings(recordings));
     notes.extend(sampling::too_short(recordings));
     Ok(notes)
@@ -35,10 +34,14 @@ pub fn notes(recordings: &[Recording], parameters: &Parameters) -> Result<Vec<St
 /// # Errors
 /// As [`notes`].
 pub fn notes_on_units(recordings: &[Recording], parameters: &Parameters) -> Result<Vec<String>> {
+    of_each(recordings, |recording| units::notes(recording, parameters))
+}
+
+/// What is found in each recording, with its name before it.
+fn of_each(recordings: &[Recording], found: impl Fn(&Recording) -> Result<Vec<String>>) -> Result<Vec<String>> {
     let mut notes = Vec::new();
     for recording in recordings {
-        let found = units::notes(recording, parameters)?;
-        notes.extend(found.into_iter().map(|note| format!("{}: {note}", recording.name())));
+        notes.extend(found(recording)?.into_iter().map(|note| format!("{}: {note}", recording.name())));
     }
     Ok(notes)
 }
