@@ -226,6 +226,31 @@ mod tests {
     }
 
     #[test]
+    fn a_load_in_motion_is_ahead_of_a_sensor_that_is_late() {
+        // 50 mm/s, shown 40 ms late in all.
+        let (rate, first) = (0.05, 0.12);
+        let row = |k: u32| format!("{},2,2,{},40\n", 0.01 * f64::from(k), 1e3 * (first + rate * 0.01 * f64::from(k)));
+        let rows: String = (0..100).map(row).collect();
+        let header = "time [s],command [V],gauge_pressure [bar],contraction [mm],load_mass [kg]";
+        let path = std::path::Path::new("moves.csv");
+        let recording = Recording::parse(format!("{header}\n{rows}").as_bytes(), path, &[]).unwrap();
+        let mut parameters = Parameters::default();
+        parameters.load.mass = 40.0;
+        parameters.initial.gauge_pressure = 2e5;
+        let hanging = hanging_contraction(&parameters, 0.0).unwrap();
+        for (delay, averaging, filter_time) in
+            [(0.04, 0.0, 0.0), (0.0, 0.08, 0.0), (0.0, 0.0, 0.04), (0.01, 0.02, 0.02)]
+        {
+            let sensor = &mut parameters.effects.contraction_sensor_delay;
+            (sensor.delay, sensor.averaging, sensor.filter_time) = (delay, averaging, filter_time);
+            let InitialMotion { contraction_offset, contraction_velocity } = initial_motion(&parameters, &recording);
+            let place = hanging + contraction_offset;
+            assert!((place - first - 0.04 * rate).abs() < 1e-6, "{delay} {averaging} {filter_time}: {place}");
+            assert!((contraction_velocity - rate).abs() < 1e-6, "{contraction_velocity}");
+        }
+    }
+
+    #[test]
     fn a_load_that_rests_at_the_start_is_not_taken_to_move() {
         assert_eq!(course(|time| if time > 1.0 { 0.2 } else { 0.1 }), None);
         assert_eq!(course(|time| 0.1 + 0.01 * (1.0 - (-time / 5.0).exp())), None, "it creeps");

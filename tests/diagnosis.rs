@@ -293,6 +293,19 @@ fn outputs_that_end_early_are_refused_with_a_sentence() {
 }
 
 #[test]
+fn fifty_samples_are_diagnosed_and_fewer_are_refused() {
+    let whole = muscle_as_text(&Parameters::default(), stairs_and_ramps, Between::Lines, stairs_and_ramps(0.0));
+    let first = |samples: usize| {
+        let text: String = whole.lines().take(1 + samples).map(|row| format!("{row}\n")).collect();
+        let recording = Recording::parse(text.as_bytes(), Path::new("short.csv"), &[]).unwrap();
+        diagnose(&Parameters::default(), &[recording], DEFAULT_TOLERANCE, &|_| ())
+    };
+    assert_eq!(first(50).unwrap().verdict, Verdict::Nominal);
+    let refused = first(49).unwrap_err().to_string();
+    assert!(refused.contains("at least 50 samples"), "{refused}");
+}
+
+#[test]
 fn a_nominal_model_without_damping_is_no_trouble() {
     let mut nominal = Parameters::default();
     nominal.muscle.damping = 0.0;

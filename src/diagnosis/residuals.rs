@@ -692,6 +692,31 @@ mod tests {
         assert_eq!(share_to_whiten([(1.0, 0.0, 2.0)].into_iter()), 0.0);
     }
 
+    /// A load of 40 kg on a muscle at 2 bar, its command waving from the first sample on, with a gap of two seconds; its pressure
+    /// is read with noise, so that the start is estimated from a few readings.
+    fn with_a_gap() -> Recording {
+        let noise = |k: u32| 0.01 * (f64::from(k * k) * 0.71).sin();
+        let row = |k: u32| {
+            let time = 0.02 * f64::from(k);
+            let (command, pressure) = (2.0 + 0.3 * (2.0 * time).sin(), 2.0 + noise(k));
+            format!("{time},{command},{pressure},{},40\n", 100.0 + noise(k))
+        };
+        let rows: String = (0..600).filter(|k| !(200..300).contains(k)).map(row).collect();
+        let header = "time [s],command [V],gauge_pressure [bar],contraction [mm],load_mass [kg]";
+        Recording::parse(format!("{header}\n{rows}").as_bytes(), std::path::Path::new("gap.csv"), &[]).unwrap()
+    }
+
+    #[test]
+    fn readings_count_again_once_a_gap_in_the_inputs_is_forgotten() {
+        let (read, mut nominal) = (with_a_gap(), Parameters::default());
+        let doubted = |nominal: &Parameters| GapDoubt::of(nominal, &read).unwrap().doubted(Signal::Contraction, 1e-5);
+        let behind_valve = doubted(&nominal);
+        assert!(!behind_valve[199] && behind_valve[200] && behind_valve[210] && !behind_valve[499]);
+        // A shut valve takes no notice of its command; what the start is estimated from must be the same with and without the gap.
+        nominal.valve.bandwidth = 1e-9;
+        assert!(doubted(&nominal).iter().all(|is_doubted| !is_doubted));
+    }
+
     #[test]
     fn neighbours_that_hang_together_are_worth_less() {
         let alternating: Vec<f64> = (0..1000).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
