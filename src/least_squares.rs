@@ -43,6 +43,8 @@ pub struct Effort {
     pub iterations: usize,
     /// Relative decrease of the cost in one iteration below which a fit is at its end.
     pub small_decrease: f64,
+    /// Cost above which a fit is worth nothing: it is given up where it would not get there at its pace; infinite where any is worth it.
+    pub goal: f64,
 }
 
 /// How a fit ended.
@@ -52,6 +54,8 @@ pub enum Ended {
     Converged,
     /// Still getting smaller after derivatives were taken as often as is allowed.
     IterationLimit,
+    /// Getting smaller so slowly that it would not come to the goal.
+    GivenUp,
     /// The residuals could not be computed at the start.
     NoStart,
 }
@@ -71,6 +75,9 @@ pub struct Fit {
 
 /// Steps of growing damping that are tried from one place, where derivatives are fresh; else one is.
 const TRIALS: usize = 5;
+
+/// Iterations over which the pace of a fit is judged: a single one may be slow.
+const PACE: usize = 3;
 
 /// By which share of what derivatives promised a step may miss it for them to be good enough for the next one, updated.
 const SURPRISE: f64 = 0.25;
@@ -114,14 +121,26 @@ where
     let mut columns = vec![Vec::new(); problem.unknown];
     columns.extend(known.iter().zip(&free[problem.unknown..]).map(|(slope, free)| scaled(slope, free.typical)));
     let (mut damping, mut ended) = (1e-3, Ended::IterationLimit);
-    for _ in 0..effort.iterations {
+    let mut costs = vec![current.cost];
+    for left in (0..effort.iterations).rev() {
         problem.look(&mut columns, &current);
         if problem.follow(&mut columns, &mut current, &mut damping, effort.small_decrease) {
             ended = Ended::Converged;
             break;
         }
+        costs.push(current.cost);
+        if is_too_slow(&costs, left, effort.goal) {
+            ended = Ended::GivenUp;
+            break;
+        }
     }
     Fit { parameters: current.parameters, residuals: current.residuals, cost: current.cost, ended }
+}
+
+/// Whether a fit whose cost went so from iteration to iteration would end above a goal after as many as are left.
+fn is_too_slow(costs: &[f64], left: usize, goal: f64) -> bool {
+    let (Some(now), Some(before)) = (costs.last(), costs.iter().nth_back(PACE)) else { return false };
+    now - (before - now) / PACE as f64 * left as f64 > goal
 }
 
 /// Derivatives of the residuals by the first of the parameters at a place, one column each, as [`fit`] takes them.
@@ -388,10 +407,26 @@ fn bounded_minimum(matrix: &DMatrix<f64>, gradient: &DVector<f64>, bounds: &[(f6
 mod tests {
     use super::*;
 
-    const EFFORT: Effort = Effort { iterations: 60, small_decrease: 1e-6 };
+    const EFFORT: Effort = Effort { iterations: 60, small_decrease: 1e-6, goal: f64::INFINITY };
 
     fn free(start: f64, lower: f64, upper: f64) -> Free {
         Free { start, lower, upper, typical: 1.0, prior: None }
+    }
+
+    #[test]
+    fn a_fit_that_would_not_come_to_its_goal_is_given_up() {
+        // Rosenbrock's valley takes its time; its end leaves nothing.
+        let valley = |p: &[f64]| Some(vec![10.0 * (p[1] - p[0] * p[0]), 1.0 - p[0], 3.0]);
+        let free = [-1.2, 1.0].map(|start| Free { start, lower: -5.0, upper: 5.0, typical: 1.0, prior: None });
+        let ended = |goal: f64| fit(&valley, &free, &[], Effort { goal, ..EFFORT }).ended;
+        assert_eq!(
+            [ended(f64::INFINITY), ended(9.1), ended(8.0)],
+            [Ended::Converged, Ended::Converged, Ended::GivenUp]
+        );
+        // 90 % are left each time: after three more 73 of a hundred, after ten 0.9 in a straight line.
+        let costs = [137.0, 123.0, 111.0, 100.0];
+        assert!(is_too_slow(&costs, 3, 60.0) && !is_too_slow(&costs, 3, 70.0) && !is_too_slow(&costs, 10, 0.0));
+        assert!(!is_too_slow(&costs[..3], 3, 1.0), "too early to tell");
     }
 
     #[test]

@@ -15,9 +15,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Of a fit that only has to show what a hypothesis is worth.
-const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3 };
+const ROUGH: Effort = Effort { iterations: 10, small_decrease: 1e-3, goal: f64::INFINITY };
 /// Of a fit whose parameters count.
-const EXACT: Effort = Effort { iterations: 20, small_decrease: 1e-5 };
+const EXACT: Effort = Effort { iterations: 20, small_decrease: 1e-5, goal: f64::INFINITY };
 
 /// A size with many minima is looked for so many steps to either side, each this share of it, first coarse and then fine.
 const SCAN_STEPS: i32 = 20;
@@ -171,7 +171,7 @@ impl<'a> Bench<'a> {
         let nominal = Hypothesis::default();
         let first = self.exact_fit(&nominal, self.nominal, Scope::All)?;
         self.slopes = self.slopes(&first)?;
-        self.fit(&nominal, &first.parameters, Scope::All, &self.slopes, EXACT)
+        Some(self.fit(&nominal, &first.parameters, Scope::All, &self.slopes, EXACT)?.0)
     }
 
     /// Fits a hypothesis on all samples, starting from a model, to see what it is worth. What the corrections do to the
@@ -184,7 +184,7 @@ impl<'a> Bench<'a> {
 
     /// The same with slopes from nearby, be it also of parameters of effects: an iteration costs one simulation per other parameter.
     pub fn rough_fit_with(&self, slopes: &Slopes, hypothesis: &Hypothesis, start: &Parameters) -> Option<Fitted> {
-        self.fit(hypothesis, start, Scope::All, slopes, ROUGH)
+        Some(self.fit(hypothesis, start, Scope::All, slopes, ROUGH)?.0)
     }
 
     /// The same from a fit to recordings that were taken in another way; what the corrections do is looked at there.
@@ -198,15 +198,26 @@ impl<'a> Bench<'a> {
     ///
     /// `None` where the start cannot be simulated.
     pub fn exact_fit(&self, hypothesis: &Hypothesis, start: &Parameters, scope: Scope) -> Option<Fitted> {
+        self.exact_fit_near(hypothesis, start, scope, f64::INFINITY)
+    }
+
+    /// The same, given up where it would not come near enough to another fit: to the sum of squares of the goal.
+    pub fn exact_fit_near(
+        &self,
+        hypothesis: &Hypothesis,
+        start: &Parameters,
+        scope: Scope,
+        goal: f64,
+    ) -> Option<Fitted> {
         let weights = self.data.weights(scope);
         let mut best: Option<Fitted> = None;
         let mut before = cost(&self.residuals(start)?, &weights);
         for _ in 0..MOST_ROUNDS {
             let from = best.as_ref().map_or(*start, |fitted| fitted.parameters);
             let slopes = self.slopes_at(&Hypothesis::default(), &from)?;
-            let next = self.fit(hypothesis, &from, scope, &slopes, EXACT)?;
+            let (next, ended) = self.fit(hypothesis, &from, scope, &slopes, Effort { goal, ..EXACT })?;
             let now = cost(&next.residuals, &weights);
-            let is_last = now > (1.0 - SMALL_GAIN) * before;
+            let is_last = ended == Ended::GivenUp || now > (1.0 - SMALL_GAIN) * before;
             // The start need not be as likely as a fit.
             if best.is_none() || now < before {
                 (best, before) = (Some(next), now);
@@ -216,6 +227,11 @@ impl<'a> Bench<'a> {
             }
         }
         best
+    }
+
+    /// Weighted squares that a fit leaves: what a [goal](Self::exact_fit_near) is measured by.
+    pub fn squares(&self, fitted: &Fitted) -> f64 {
+        cost(&fitted.residuals, &self.weights)
     }
 
     /// A hypothesis with only those of its refinements whose parameters are wanted, fitted anew; `None` where it cannot be simulated.
@@ -317,7 +333,7 @@ impl<'a> Bench<'a> {
         scope: Scope,
         slopes: &Slopes,
         effort: Effort,
-    ) -> Option<Fitted> {
+    ) -> Option<(Fitted, Ended)> {
         let (variables, free) = self.everything_free(hypothesis, start);
         // Those whose slopes are known last.
         let mut each: Vec<_> = variables.into_iter().zip(free).collect();
@@ -333,7 +349,7 @@ impl<'a> Bench<'a> {
             return None;
         }
         let parameters = with_values(self.nominal, &variables, &fit.parameters);
-        Some(self.fitted(hypothesis, parameters, self.residuals(&parameters)?))
+        Some((self.fitted(hypothesis, parameters, self.residuals(&parameters)?), fit.ended))
     }
 
     /// The baseline with a cause beside it that is in no library, given what one of size one adds to the residuals; fitted to the samples in

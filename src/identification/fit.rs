@@ -35,8 +35,8 @@ const STARTS: usize = 6;
 const COARSE: usize = 150;
 /// Below this share of the largest singular value a direction is said to be weak.
 const WEAK: f64 = 1e-3;
-const LOOK: Effort = Effort { iterations: 15, small_decrease: 1e-3 };
-const POLISH: Effort = Effort { iterations: 60, small_decrease: 1e-12 };
+const LOOK: Effort = Effort { iterations: 15, small_decrease: 1e-3, goal: f64::INFINITY };
+const POLISH: Effort = Effort { iterations: 60, small_decrease: 1e-12, goal: f64::INFINITY };
 
 /// Where a fit starts.
 #[derive(Debug, Clone, Copy)]

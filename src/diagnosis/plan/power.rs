@@ -40,7 +40,7 @@ const LEAST_CONTRACTION: f64 = 0.01;
 /// Lengths at which a muscle is held, as shares of its rest length.
 const LOCKED: [f64; 2] = [0.06, 0.14];
 /// Of a refit.
-const EFFORT: Effort = Effort { iterations: 6, small_decrease: 5e-2 };
+const EFFORT: Effort = Effort { iterations: 6, small_decrease: 5e-2, goal: f64::INFINITY };
 /// Starts from which a rival of unknown size is fitted.
 const STARTS: usize = 2;
 

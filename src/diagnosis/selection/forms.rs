@@ -17,6 +17,8 @@ const MAY_BE_RIVALS: usize = 5;
 /// How many times what a rival may leave a fit must leave for its end not to be worth the time: of 395 ends of fits none took off more than
 /// five sixths.
 pub const OUT_OF_REACH: f64 = 10.0;
+/// How many times the squares of a best hypothesis of several effects that leaves more than forms may a fit must come to, to be worth its end.
+const NEAR: f64 = 1.2;
 
 impl Search<'_> {
     /// Hypotheses refined and fitted to the end, since what a fit left undone would else be credited to the next effect: the very
@@ -42,7 +44,7 @@ impl Search<'_> {
             1 if may_be_form || explains => self.in_best_form(judged, Some(&best)),
             _ if leads == Some(rank) => self.in_best_form(judged, None),
             _ if may_be_form => self.finished_refined(judged, Some(&best), |judged| self.refined(judged)),
-            parts => self.finished_refined(judged, None, |judged| self.part_refined(judged, parts - 1)),
+            parts => self.finished_refined(judged, Some(&best), |judged| self.part_refined(judged, parts - 1)),
         });
         let mut all: Vec<Judged> = refined.collect();
         all.push(best);
@@ -51,16 +53,33 @@ impl Search<'_> {
     }
 
     pub(super) fn finished(&self, judged: Judged) -> Judged {
+        self.finished_near(judged, None)
+    }
+
+    /// A hypothesis fitted to the end, unless that comes nowhere near the `best`.
+    fn finished_near(&self, judged: Judged, best: Option<&Judged>) -> Judged {
+        if self.is_out_of_reach(best, &judged) {
+            return judged;
+        }
         let start = self.bench.scanned(&judged.fitted);
         self.bench
-            .exact_fit(&judged.fitted.hypothesis, &start, Scope::All)
+            .exact_fit_near(&judged.fitted.hypothesis, &start, Scope::All, NEAR * self.to_beat(best))
             .map_or(judged.clone(), |fitted| self.judge(fitted))
+    }
+
+    /// Squares that are left by a best hypothesis of several effects that can be, but leaves more than forms may; infinite for others. What comes nowhere
+    /// near these becomes neither a rival nor the best. Of single effects each may be alone in its signal.
+    fn to_beat(&self, best: Option<&Judged>) -> f64 {
+        let leaves_much = |best: &&Judged| {
+            best.fitted.hypothesis.parts.len() > 1 && is_possible(best) && !self.may_be_form(&best.fitted.losses)
+        };
+        best.filter(leaves_much).map_or(f64::INFINITY, |best| self.bench.squares(&best.fitted))
     }
 
     /// A hypothesis refined and fitted to the end, unless that brings it nowhere near the `best`. Where its causes could not be as they are
     /// then, without what the data do not ask for, or as it was.
     fn finished_refined(&self, judged: Judged, best: Option<&Judged>, refine: impl Fn(Judged) -> Judged) -> Judged {
-        let finished = |judged| if self.is_out_of_reach(best, &judged) { judged } else { self.finished(judged) };
+        let finished = |judged| self.finished_near(judged, best);
         let refined = finished(refine(judged.clone()));
         if is_possible(&refined) {
             return refined;
@@ -76,16 +95,20 @@ impl Search<'_> {
         instead.find(|fit| evidence(fit, &impossible.fitted) < LEAST_EVIDENCE).map(|fit| self.judge(fit))
     }
 
-    /// Whether a hypothesis explains so much less than a best one that says all that neither the end of its fit nor another form changes anything.
+    /// Whether a hypothesis explains so much less than a best one that neither the end of its fit nor another form changes anything.
     pub(super) fn is_out_of_reach(&self, best: Option<&Judged>, other: &Judged) -> bool {
-        best.filter(|best| self.says_all(best)).is_some_and(|best| {
-            let before = beyond_noise(&self.baseline.losses);
-            let [best, rival] = [best, other].map(|judged| &judged.fitted.hypothesis);
-            let may_be_simpler = best.parts.len() == 1 && rival.size() < best.size();
-            !leaves_at_most(&other.fitted.losses, |signal| {
-                let of_form = if may_be_simpler { left_by_form(before[&signal]) } else { 0.0 };
-                OUT_OF_REACH * left_by_structure(signal, &self.bench.data).max(of_form)
-            })
+        best.is_some_and(|best| self.says_all(best) && self.leaves_too_much(best, other))
+            || self.bench.squares(&other.fitted) > OUT_OF_REACH * self.to_beat(best)
+    }
+
+    /// Whether a hypothesis leaves so much in some signal that it is no rival of a best one that says all.
+    fn leaves_too_much(&self, best: &Judged, other: &Judged) -> bool {
+        let before = beyond_noise(&self.baseline.losses);
+        let [best, rival] = [best, other].map(|judged| &judged.fitted.hypothesis);
+        let may_be_simpler = best.parts.len() == 1 && rival.size() < best.size();
+        !leaves_at_most(&other.fitted.losses, |signal| {
+            let of_form = if may_be_simpler { left_by_form(before[&signal]) } else { 0.0 };
+            OUT_OF_REACH * left_by_structure(signal, &self.bench.data).max(of_form)
         })
     }
 
