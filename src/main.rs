@@ -5,6 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use sinew::comparison::{self, Muscle, compare};
 use sinew::diagnosis::plan::{self, Limits, Plan, Task};
+use sinew::diagnosis::report::{EXTENDED, FILES, NOMINAL};
 use sinew::diagnosis::{self, Diagnosis, diagnose, report};
 use sinew::effects::Effects;
 use sinew::identification::structure::{Braid, all_models, model_name};
@@ -231,7 +232,7 @@ impl PlanArguments {
 
     /// Files that it reads, where they are there.
     fn reads(&self) -> Vec<PathBuf> {
-        let beside = |path: &Path| ["nominal.toml", "extended.toml"].map(|name| path.with_file_name(name));
+        let beside = |path: &Path| [NOMINAL, EXTENDED].map(|file| path.with_file_name(file.name));
         let of_diagnosis =
             self.of_diagnosis().into_iter().flat_map(|path| beside(path).into_iter().chain([path.into()]));
         of_diagnosis.chain(self.nominal.iter().map(PathBuf::from)).collect()
@@ -239,7 +240,7 @@ impl PlanArguments {
 
     /// The model that was diagnosed.
     fn nominal(&self) -> Result<Parameters> {
-        let beside = self.of_diagnosis().map(|path| path.with_file_name("nominal.toml"));
+        let beside = self.of_diagnosis().map(|path| path.with_file_name(NOMINAL.name));
         match (&self.nominal, beside) {
             (Some(given), _) => Parameters::load(given),
             (None, Some(beside)) if beside.is_file() => Parameters::load(&beside.display().to_string()),
@@ -249,7 +250,7 @@ impl PlanArguments {
 
     /// That it is planned for another model than was diagnosed, where that is not known.
     fn note(&self) -> Option<String> {
-        let beside = self.of_diagnosis()?.with_file_name("nominal.toml");
+        let beside = self.of_diagnosis()?.with_file_name(NOMINAL.name);
         (self.nominal.is_none() && !beside.is_file())
             .then(|| format!("there is no {}: planned for {USUAL_MUSCLE}", beside.display()))
     }
@@ -488,8 +489,8 @@ fn run(command: Command) -> Result<Answer> {
     let read = command.reads();
     if let Command::Diagnose { out, .. } = &command {
         // So much is known before a long search.
-        let again = ["nominal.toml", "extended.toml", "simulated.csv"].map(|name| out.join(name));
-        export::spare(again.iter().map(PathBuf::as_path), &read)?;
+        let written = FILES.map(|file| out.join(file.name));
+        export::spare(written.iter().map(PathBuf::as_path), &read)?;
     }
     answer(command)?.write(&read)
 }
