@@ -8,7 +8,7 @@ use crate::muscle::{ForceModelName, ForceModels, Muscle};
 use crate::reference::Reference;
 use crate::valve::Valve;
 use crate::variables::{Declared, Kind, Variable};
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use std::fmt::Write;
 
 macro_rules! groups {
@@ -174,7 +174,7 @@ impl Parameters {
         if !path.exists() {
             return Self::preset(source);
         }
-        let text = std::fs::read_to_string(path).map_err(|error| Error::Io { path: path.to_owned(), source: error })?;
+        let text = input::read_text(path)?;
         let mut parameters = Self::default();
         parameters.apply_toml(&text, source)?;
         Ok(parameters)

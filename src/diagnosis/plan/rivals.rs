@@ -8,7 +8,7 @@ use crate::measurement::Signal;
 use crate::parameters::Parameters;
 use crate::simulation::OUTPUTS;
 use crate::variables::Variable;
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::path::Path;
@@ -90,7 +90,7 @@ struct Source<'a> {
 
 impl<'a> Source<'a> {
     fn read(path: &'a Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        let bytes = input::read(path)?;
         let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
         let no_json = |error: serde_json::Error| Error::Diagnosis {
             path: path.to_owned(),
