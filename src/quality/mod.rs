@@ -102,6 +102,18 @@ fn middle_span(values: &[f64]) -> f64 {
 
 /// Correlation of two signals over the samples that both have; 0 where one of them rests.
 pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+/// Slope and offset of the straight line by which one signal best gives another, over the samples that both have; NaN where
+/// the first one rests.
+fn line(from: &[f64], to: &[f64]) -> (f64, f64) {
+    let pairs = || from.iter().zip(to).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let count = pairs().count() as f64;
+    let (mean_from, mean_to) =
+        (pairs().map(|(a, _)| a).sum::<f64>() / count, pairs().map(|(_, b)| b).sum::<f64>() / count);
+    let together: f64 = pairs().map(|(a, b)| (a - mean_from) * (b - mean_to)).sum();
+    let slope = together / pairs().map(|(a, _)| (a - mean_from).powi(2)).sum::<f64>();
+    (slope, mean_to - slope * mean_from)
+}
+
     let pairs: Vec<(f64, f64)> =
         a.iter().copied().zip(b.iter().copied()).filter(|(a, b)| a.is_finite() && b.is_finite()).collect();
     let mean = |pick: fn(&(f64, f64)) -> f64| pairs.iter().map(pick).sum::<f64>() / pairs.len() as f64;
