@@ -203,16 +203,16 @@ struct PlanArguments {
     #[arg(long, value_delimiter = ',', default_value = "gauge_pressure,contraction", value_parser = sensor)]
     sensors: Vec<Signal>,
     /// Highest gauge pressure, as in "5 bar"; without a unit in Pa
-    #[arg(long, default_value = "5 bar", value_parser = |text: &str| quantity(text, Signal::GaugePressure))]
+    #[arg(long, default_value = "5 bar", allow_hyphen_values = true, value_parser = |text: &str| quantity(text, Signal::GaugePressure))]
     most_pressure: f64,
     /// Largest contraction, as in "200 mm"; without a unit in m [default: a quarter of the rest length]
-    #[arg(long, value_parser = |text: &str| quantity(text, Signal::Contraction))]
+    #[arg(long, allow_hyphen_values = true, value_parser = |text: &str| quantity(text, Signal::Contraction))]
     most_contraction: Option<f64>,
     /// Loads that can be hung on, kg
-    #[arg(long, value_delimiter = ',', default_value = "20,40", value_parser = |text: &str| quantity(text, Signal::LoadMass))]
+    #[arg(long, value_delimiter = ',', default_value = "20,40", allow_hyphen_values = true, value_parser = |text: &str| quantity(text, Signal::LoadMass))]
     load_mass: Vec<f64>,
     /// Longest single recording, s
-    #[arg(long, default_value_t = plan::USUAL_DURATION, value_parser = |text: &str| quantity(text, Signal::Time))]
+    #[arg(long, default_value_t = plan::USUAL_DURATION, allow_hyphen_values = true, value_parser = |text: &str| quantity(text, Signal::Time))]
     duration: f64,
     /// Relative error of the nominal coefficients that is no cause [default: that of the diagnosis, or else 0.03]
     #[arg(long, value_parser = tolerance)]
@@ -307,7 +307,7 @@ fn quantity(text: &str, signal: Signal) -> std::result::Result<f64, String> {
     let scale = signal.units().iter().find(|(symbol, _)| *symbol == unit).map(|(_, scale)| *scale);
     let scale = if unit.is_empty() { Some(1.0) } else { scale };
     match (number.parse::<f64>(), scale) {
-        (Ok(value), Some(scale)) if value.is_finite() && value > 0.0 => Ok(value * scale),
+        (Ok(value), Some(scale)) if value > 0.0 && (value * scale).is_finite() => Ok(value * scale),
         _ => {
             let symbols = signal.units().iter().map(|(symbol, _)| *symbol).collect::<Vec<_>>().join(", ");
             Err(format!("a positive number, in {symbols}"))

@@ -7,6 +7,8 @@ pub(crate) mod sampling;
 pub(crate) mod sensors;
 mod units;
 
+pub(crate) use units::HIGHEST_PRESSURE;
+
 use crate::Result;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
@@ -100,8 +102,6 @@ fn middle_span(values: &[f64]) -> f64 {
     quantile(values, 0.95).zip(quantile(values, 0.05)).map_or(0.0, |(high, low)| high - low)
 }
 
-/// Correlation of two signals over the samples that both have; 0 where one of them rests.
-pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
 /// Slope and offset of the straight line by which one signal best gives another, over the samples that both have; NaN where
 /// the first one rests.
 fn line(from: &[f64], to: &[f64]) -> (f64, f64) {
@@ -114,6 +114,8 @@ fn line(from: &[f64], to: &[f64]) -> (f64, f64) {
     (slope, mean_to - slope * mean_from)
 }
 
+/// Correlation of two signals over the samples that both have; 0 where one of them rests.
+pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let pairs: Vec<(f64, f64)> =
         a.iter().copied().zip(b.iter().copied()).filter(|(a, b)| a.is_finite() && b.is_finite()).collect();
     let mean = |pick: fn(&(f64, f64)) -> f64| pairs.iter().map(pick).sum::<f64>() / pairs.len() as f64;

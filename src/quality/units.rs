@@ -12,7 +12,7 @@ const PLANT: f64 = 3.162_277_660_168_379_5;
 /// No effect in a muscle or a valve, and no other muscle in its place, makes a signal a hundred times what it should be.
 const ABSURD: f64 = 100.0;
 /// No pneumatic muscle is run above this gauge pressure, Pa: compressed air comes at 6 to 10 bar, muscles burst above 20.
-const HIGHEST_PRESSURE: f64 = 20e5;
+pub(crate) const HIGHEST_PRESSURE: f64 = 20e5;
 /// Below this gauge pressure, Pa, no muscle does anything: it takes some 0.2 bar to widen its membrane.
 const LOWEST_PRESSURE: f64 = 0.02e5;
 /// The nominal model may be poor; a unit is wrong where another one makes the model's error this many times smaller.
