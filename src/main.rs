@@ -242,9 +242,9 @@ impl PlanArguments {
     fn nominal(&self) -> Result<Parameters> {
         let beside = self.of_diagnosis().map(|path| path.with_file_name(NOMINAL.name));
         match (&self.nominal, beside) {
-            (Some(given), _) => Parameters::load(given),
-            (None, Some(beside)) if beside.is_file() => Parameters::load(&beside.display().to_string()),
-            (None, _) => Parameters::load(USUAL_MUSCLE),
+            (Some(given), _) => load_parameters(given),
+            (None, Some(beside)) if beside.is_file() => load_parameters(&beside.display().to_string()),
+            (None, _) => load_parameters(USUAL_MUSCLE),
         }
     }
 
@@ -327,7 +327,7 @@ struct ParameterSource {
 
 impl ParameterSource {
     fn load(&self) -> Result<Parameters> {
-        Parameters::load(&self.source)
+        load_parameters(&self.source)
     }
 
     fn path(&self) -> PathBuf {
@@ -354,6 +354,13 @@ impl RecordingSource {
 /// Says beside the answer what a person should know.
 fn say_note(note: &str) {
     eprintln!("note: {}", printable(note));
+}
+
+/// Loads parameters and says what of their file is in doubt.
+fn load_parameters(source: &str) -> Result<Parameters> {
+    let (parameters, note) = Parameters::load_with_note(source)?;
+    note.iter().for_each(|note| say_note(note));
+    Ok(parameters)
 }
 
 /// Reads recordings and says what of them is not used.
@@ -622,7 +629,7 @@ fn run_comparison(
     let stem = |source: &String| printable(&stem(source));
     let stems: Vec<String> = muscles.iter().map(|(source, _)| stem(source)).collect();
     let read = |(source, files): (String, Vec<PathBuf>)| -> Result<Muscle> {
-        let given = Parameters::load(&source)?;
+        let given = load_parameters(&source)?;
         let short = stem(&source);
         let name = if stems.iter().filter(|other| **other == short).count() > 1 { printable(&source) } else { short };
         let recordings = read_recordings(&files, renamed)?;
