@@ -11,6 +11,7 @@ pub mod variables;
 pub mod controller;
 pub mod correction;
 pub mod effects;
+mod input;
 pub mod integrator;
 pub mod load;
 pub mod memory;

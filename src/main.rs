@@ -5,6 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use sinew::comparison::{self, Muscle, compare};
 use sinew::diagnosis::plan::{self, Limits, Plan, Task};
+use sinew::diagnosis::report::{EXTENDED, FILES, NOMINAL};
 use sinew::diagnosis::{self, Diagnosis, diagnose, report};
 use sinew::effects::Effects;
 use sinew::identification::structure::{Braid, all_models, model_name};
@@ -202,16 +203,16 @@ struct PlanArguments {
     #[arg(long, value_delimiter = ',', default_value = "gauge_pressure,contraction", value_parser = sensor)]
     sensors: Vec<Signal>,
     /// Highest gauge pressure, as in "5 bar"; without a unit in Pa
-    #[arg(long, default_value = "5 bar", value_parser = |text: &str| quantity(text, Signal::GaugePressure))]
+    #[arg(long, default_value = "5 bar", allow_hyphen_values = true, value_parser = |text: &str| quantity(text, Signal::GaugePressure))]
     most_pressure: f64,
     /// Largest contraction, as in "200 mm"; without a unit in m [default: a quarter of the rest length]
-    #[arg(long, value_parser = |text: &str| quantity(text, Signal::Contraction))]
+    #[arg(long, allow_hyphen_values = true, value_parser = |text: &str| quantity(text, Signal::Contraction))]
     most_contraction: Option<f64>,
     /// Loads that can be hung on, kg
-    #[arg(long, value_delimiter = ',', default_value = "20,40", value_parser = |text: &str| quantity(text, Signal::LoadMass))]
+    #[arg(long, value_delimiter = ',', default_value = "20,40", allow_hyphen_values = true, value_parser = |text: &str| quantity(text, Signal::LoadMass))]
     load_mass: Vec<f64>,
     /// Longest single recording, s
-    #[arg(long, default_value_t = plan::USUAL_DURATION, value_parser = |text: &str| quantity(text, Signal::Time))]
+    #[arg(long, default_value_t = plan::USUAL_DURATION, allow_hyphen_values = true, value_parser = |text: &str| quantity(text, Signal::Time))]
     duration: f64,
     /// Relative error of the nominal coefficients that is no cause [default: that of the diagnosis, or else 0.03]
     #[arg(long, value_parser = tolerance)]
@@ -231,7 +232,7 @@ impl PlanArguments {
 
     /// Files that it reads, where they are there.
     fn reads(&self) -> Vec<PathBuf> {
-        let beside = |path: &Path| ["nominal.toml", "extended.toml"].map(|name| path.with_file_name(name));
+        let beside = |path: &Path| [NOMINAL, EXTENDED].map(|file| path.with_file_name(file.name));
         let of_diagnosis =
             self.of_diagnosis().into_iter().flat_map(|path| beside(path).into_iter().chain([path.into()]));
         of_diagnosis.chain(self.nominal.iter().map(PathBuf::from)).collect()
@@ -239,17 +240,17 @@ impl PlanArguments {
 
     /// The model that was diagnosed.
     fn nominal(&self) -> Result<Parameters> {
-        let beside = self.of_diagnosis().map(|path| path.with_file_name("nominal.toml"));
+        let beside = self.of_diagnosis().map(|path| path.with_file_name(NOMINAL.name));
         match (&self.nominal, beside) {
-            (Some(given), _) => Parameters::load(given),
-            (None, Some(beside)) if beside.is_file() => Parameters::load(&beside.display().to_string()),
-            (None, _) => Parameters::load(USUAL_MUSCLE),
+            (Some(given), _) => load_parameters(given),
+            (None, Some(beside)) if beside.is_file() => load_parameters(&beside.display().to_string()),
+            (None, _) => load_parameters(USUAL_MUSCLE),
         }
     }
 
     /// That it is planned for another model than was diagnosed, where that is not known.
     fn note(&self) -> Option<String> {
-        let beside = self.of_diagnosis()?.with_file_name("nominal.toml");
+        let beside = self.of_diagnosis()?.with_file_name(NOMINAL.name);
         (self.nominal.is_none() && !beside.is_file())
             .then(|| format!("there is no {}: planned for {USUAL_MUSCLE}", beside.display()))
     }
@@ -306,7 +307,7 @@ fn quantity(text: &str, signal: Signal) -> std::result::Result<f64, String> {
     let scale = signal.units().iter().find(|(symbol, _)| *symbol == unit).map(|(_, scale)| *scale);
     let scale = if unit.is_empty() { Some(1.0) } else { scale };
     match (number.parse::<f64>(), scale) {
-        (Ok(value), Some(scale)) if value.is_finite() && value > 0.0 => Ok(value * scale),
+        (Ok(value), Some(scale)) if value > 0.0 && (value * scale).is_finite() => Ok(value * scale),
         _ => {
             let symbols = signal.units().iter().map(|(symbol, _)| *symbol).collect::<Vec<_>>().join(", ");
             Err(format!("a positive number, in {symbols}"))
@@ -326,7 +327,7 @@ struct ParameterSource {
 
 impl ParameterSource {
     fn load(&self) -> Result<Parameters> {
-        Parameters::load(&self.source)
+        load_parameters(&self.source)
     }
 
     fn path(&self) -> PathBuf {
@@ -353,6 +354,13 @@ impl RecordingSource {
 /// Says beside the answer what a person should know.
 fn say_note(note: &str) {
     eprintln!("note: {}", printable(note));
+}
+
+/// Loads parameters and says what of their file is in doubt.
+fn load_parameters(source: &str) -> Result<Parameters> {
+    let (parameters, note) = Parameters::load_with_note(source)?;
+    note.iter().for_each(|note| say_note(note));
+    Ok(parameters)
 }
 
 /// Reads recordings and says what of them is not used.
@@ -488,8 +496,8 @@ fn run(command: Command) -> Result<Answer> {
     let read = command.reads();
     if let Command::Diagnose { out, .. } = &command {
         // So much is known before a long search.
-        let again = ["nominal.toml", "extended.toml", "simulated.csv"].map(|name| out.join(name));
-        export::spare(again.iter().map(PathBuf::as_path), &read)?;
+        let written = FILES.map(|file| out.join(file.name));
+        export::spare(written.iter().map(PathBuf::as_path), &read)?;
     }
     answer(command)?.write(&read)
 }
@@ -621,7 +629,7 @@ fn run_comparison(
     let stem = |source: &String| printable(&stem(source));
     let stems: Vec<String> = muscles.iter().map(|(source, _)| stem(source)).collect();
     let read = |(source, files): (String, Vec<PathBuf>)| -> Result<Muscle> {
-        let given = Parameters::load(&source)?;
+        let given = load_parameters(&source)?;
         let short = stem(&source);
         let name = if stems.iter().filter(|other| **other == short).count() > 1 { printable(&source) } else { short };
         let recordings = read_recordings(&files, renamed)?;

@@ -1,7 +1,7 @@
 //! Recordings: columns of a CSV file in SI units.
 
 use crate::start::Motion;
-use crate::{Error, Result, printable};
+use crate::{Error, Result, input, printable};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -111,8 +111,7 @@ impl Recording {
     /// [`Error::Io`]; [`Error::Csv`] with line and column for what cannot be understood; [`Error::Recording`] where
     /// signals are missing that every use needs.
     pub fn read(path: &Path, renamed: &[(String, String)]) -> Result<Self> {
-        let text = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-        Self::parse(&text, path, renamed)
+        Self::parse(&input::read(path)?, path, renamed)
     }
 
     /// As [`Recording::read`], of a text at hand; `path` is what messages call it.

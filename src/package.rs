@@ -4,7 +4,7 @@ use crate::effects::Effects;
 use crate::model::Interface;
 use crate::model_description::model_description;
 use crate::parameters::Parameters;
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use minijinja::context;
 use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
@@ -46,7 +46,7 @@ impl Library {
     /// [`Error::Platform`], [`Error::Io`], [`Error::NoLibrary`] for another file than a library for the platform.
     pub fn from_argument(argument: &str) -> Result<Self> {
         let (platform, file) = argument.split_once('=').ok_or(Error::Platform { argument: argument.to_owned() })?;
-        let bytes = std::fs::read(file).map_err(|source| Error::Io { path: file.into(), source })?;
+        let bytes = input::read(file.as_ref())?;
         let library = Self::new(platform, bytes)?;
         let begins =
             |(extension, start): &(&str, &[u8])| *extension == library.extension && library.bytes.starts_with(start);

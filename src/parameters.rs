@@ -8,7 +8,7 @@ use crate::muscle::{ForceModelName, ForceModels, Muscle};
 use crate::reference::Reference;
 use crate::valve::Valve;
 use crate::variables::{Declared, Kind, Variable};
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use std::fmt::Write;
 
 macro_rules! groups {
@@ -166,18 +166,50 @@ impl Parameters {
     /// # Errors
     /// [`Error::UnknownPreset`] where there is neither; [`Error::Io`]; otherwise as [`Parameters::apply_toml`].
     pub fn load(source: &str) -> Result<Self> {
+        Self::load_with_note(source).map(|(parameters, _)| parameters)
+    }
+
+    /// As [`Parameters::load`], with what a person should know of the file: that it gives coefficients of other force
+    /// models than the chosen one.
+    ///
+    /// # Errors
+    /// As [`Parameters::load`].
+    pub fn load_with_note(source: &str) -> Result<(Self, Option<String>)> {
         let path = std::path::Path::new(source);
         if path.is_dir() {
             let no_file = || std::io::Error::other("is a folder: give a TOML file in it, or a preset");
-            return Self::preset(source).map_err(|_| Error::Io { path: path.to_owned(), source: no_file() });
+            let preset = Self::preset(source).map_err(|_| Error::Io { path: path.to_owned(), source: no_file() });
+            return Ok((preset?, None));
         }
         if !path.exists() {
-            return Self::preset(source);
+            return Ok((Self::preset(source)?, None));
         }
-        let text = std::fs::read_to_string(path).map_err(|error| Error::Io { path: path.to_owned(), source: error })?;
+        let text = input::read_text(path)?;
         let mut parameters = Self::default();
-        parameters.apply_toml(&text, source)?;
-        Ok(parameters)
+        let table = parsed(&text, source)?;
+        parameters.apply_table(&table, source)?;
+        let note = parameters.of_other_models(&table).map(|note| format!("{source}: {note}"));
+        Ok((parameters, note))
+    }
+
+    /// Coefficients in a file of other force models than the chosen one, where it gives none of that, in a sentence. A file
+    /// that gives those of all models is a complete one, as `to_toml` writes it.
+    fn of_other_models(&self, table: &toml::Table) -> Option<String> {
+        let mut groups = Vec::new();
+        self.force_models.visit(&mut |variable, _| groups.push(variable.group()));
+        groups.dedup();
+        let is_given = |group: &str| table.keys().any(|key| key.split('.').next() == Some(group));
+        let given: Vec<&str> = groups.iter().copied().filter(|group| is_given(group)).collect();
+        let chosen = self.muscle.force_model as usize - 1;
+        if given.is_empty() || given.len() == groups.len() || given.contains(&ForceModels::GROUPS[chosen]) {
+            return None;
+        }
+        Some(format!(
+            "it gives coefficients in [{}], but `muscle.force_model` is {}, which uses none of them: choose the model they belong \
+             to under [muscle], or leave them out",
+            given.join("], ["),
+            ForceModelName::CHOICES[chosen].name
+        ))
     }
 
     /// Changes parameters by a TOML text; a top-level `preset = "NAME"` says what the text starts from.
@@ -186,11 +218,10 @@ impl Parameters {
     /// [`Error::Toml`] with the line for a text that is not TOML; [`Error::ParameterFile`] for a name, kind or value
     /// that does not fit. The parameters are then unchanged.
     pub fn apply_toml(&mut self, text: &str, source_name: &str) -> Result<()> {
-        let table: toml::Table = toml::from_str(text).map_err(|error| Error::Toml {
-            source_name: source_name.to_owned(),
-            line: error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count()),
-            problem: error.message().to_owned(),
-        })?;
+        self.apply_table(&parsed(text, source_name)?, source_name)
+    }
+
+    fn apply_table(&mut self, table: &toml::Table, source_name: &str) -> Result<()> {
         let in_file =
             |problem| Error::ParameterFile { source_name: source_name.to_owned(), problem: Box::new(problem) };
         let mut changed = match table.get("preset") {
@@ -204,7 +235,7 @@ impl Parameters {
             }
             None => *self,
         };
-        for (key, value) in &table {
+        for (key, value) in table {
             if key != "preset" {
                 changed.apply_value(key, value).map_err(in_file)?;
             }
@@ -298,6 +329,15 @@ impl Parameters {
     }
 }
 
+/// A text as a table of TOML.
+fn parsed(text: &str, source_name: &str) -> Result<toml::Table> {
+    toml::from_str(text).map_err(|error| Error::Toml {
+        source_name: source_name.to_owned(),
+        line: error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count()),
+        problem: error.message().to_owned(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -315,6 +355,25 @@ mod tests {
     fn every_preset_loads() {
         for (name, _) in presets() {
             Parameters::preset(&name).unwrap();
+        }
+    }
+
+    #[test]
+    fn coefficients_of_another_force_model_than_the_chosen_one_are_noticed() {
+        let note = |text: &str| {
+            let (mut parameters, table) = (Parameters::default(), parsed(text, "f.toml").unwrap());
+            parameters.apply_table(&table, "f.toml").unwrap();
+            parameters.of_other_models(&table)
+        };
+        let foreign = note("[spring]\nlow_c0 = 1e5\n[mooney_rivlin]\nc10 = 1e6").unwrap();
+        assert!(foreign.starts_with("it gives coefficients in [mooney_rivlin], [spring], but"), "{foreign}");
+        assert!(foreign.contains("`muscle.force_model` is virtual-area, which uses none of them"), "{foreign}");
+        for sound in ["[load]\nmass = 3", "[spring]\nlow_c0 = 1e5\n[muscle]\nforce_model = \"spring\"", PRESETS[1].toml]
+        {
+            assert_eq!(note(sound), None);
+        }
+        for (name, _) in presets() {
+            assert_eq!(note(&Parameters::preset(&name).unwrap().to_toml()), None, "{name}");
         }
     }
 

@@ -1,5 +1,6 @@
 //! The diagnosis on recordings made by an independent program (`data/generate.py`), and on spoilt ones.
 
+use sinew::diagnosis::report::FILES;
 use sinew::diagnosis::{DEFAULT_TOLERANCE, Diagnosis, Verdict, diagnose};
 use sinew::measurement::Signal::{Command, Contraction, Force, GaugePressure};
 use sinew::measurement::{Between, Recording, numbered};
@@ -326,9 +327,9 @@ fn an_unknown_cause_gets_a_correction_and_no_name() {
     assert_eq!((correction.acts_on, correction.variables[0]), ("force", "contraction"));
     let folder = Path::new("out");
     let files = sinew::diagnosis::report::files(&found, &Parameters::default(), &[stopped], &[], folder).unwrap();
-    for name in ["unknown_cause.toml", "PneumaticMuscle-unknown-cause.fmu"] {
-        assert!(files.iter().any(|(path, bytes)| path.ends_with(name) && !bytes.is_empty()), "{name}");
-    }
+    let written: Vec<_> = files.iter().map(|(path, _)| path.clone()).collect();
+    assert_eq!(written, FILES.map(|file| folder.join(file.name)));
+    assert!(files.iter().all(|(_, bytes)| !bytes.is_empty()));
     assert!(found.extended.unknown_cause.is_neutral());
 }
 

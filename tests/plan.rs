@@ -80,6 +80,27 @@ fn limits_that_leave_nothing_are_refused_with_a_sentence() {
     assert!(refused.to_string().contains("the limits leave no experiment"), "{refused}");
 }
 
+#[test]
+fn limits_without_sense_are_refused_by_option() {
+    let usual = || limits(&[20.0, 40.0]);
+    let cases = [
+        (Limits { most_pressure: 1e9, ..usual() }, "`--most-pressure` is 1000000000 Pa, allowed is 0 to 2000000 Pa"),
+        (Limits { most_pressure: f64::NAN, ..usual() }, "`--most-pressure` is NaN Pa"),
+        (Limits { most_contraction: Some(5.0), ..usual() }, "`--most-contraction` is 5 m, allowed is 0.0098"),
+        (Limits { most_contraction: Some(-0.1), ..usual() }, "`--most-contraction` is -0.1 m"),
+        (Limits { duration: f64::INFINITY, ..usual() }, "`--duration` is inf s, allowed is 1 to 3600 s"),
+        (limits(&[20.0, 0.0]), "`--load-mass` is 0 kg, allowed is 0.001 to 100000 kg"),
+        (limits(&[20.0, 40.0, 20.0]), "--load-mass: 20 kg stands there twice"),
+        (limits(&[]), "--load-mass: give at least one load"),
+    ];
+    let sensors = [Signal::Contraction];
+    let task = Task::of_effects(&["creep".to_owned(), "leakage".to_owned()], &sensors, &Parameters::default()).unwrap();
+    for (limits, expected) in cases {
+        let refused = plan::plan(&task, &Parameters::default(), DEFAULT_TOLERANCE, &limits, &|_| ()).unwrap_err();
+        assert!(refused.to_string().starts_with(expected), "{refused} should start with {expected}");
+    }
+}
+
 /// What is said of a diagnosis in which a value was changed.
 fn refusal(change: impl Fn(&mut serde_json::Value)) -> String {
     let mut diagnosis = serde_json::json!({

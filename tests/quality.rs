@@ -115,6 +115,26 @@ fn a_contraction_that_is_a_length_is_noticed() {
 }
 
 #[test]
+fn a_force_that_is_negative_throughout_is_noticed() {
+    for (name, column) in [(HANGING, "force"), (DRIVEN, "force")] {
+        let pushes = spoilt(name, column, |_, newton| -newton.abs() - 1.0);
+        let said = ["`force [N]` is negative throughout", "the pull of the muscle is positive", "change the sign"];
+        assert_says(&note(pushes), &said);
+    }
+}
+
+#[test]
+fn milliseconds_that_are_called_seconds_are_refused() {
+    for name in [HANGING, DRIVEN, "dry_friction_20kg.csv"] {
+        let refused = found(&[spoilt(name, "time", |time, _| 1e3 * time)]).unwrap_err().to_string();
+        assert_says(&refused, &[name, "and the valve answers within 0.06366 s; it looks like ms: write `time [ms]`"]);
+    }
+    // A plant that is honestly slow, and one that is sampled slowly.
+    let slow = spoilt(HANGING, "time", |time, _| 30.0 * time);
+    assert!(!found(&[slow]).unwrap().iter().any(|note| note.contains("`time")));
+}
+
+#[test]
 fn constant_columns_are_noticed() {
     assert_says(&note(spoilt(DRIVEN, "command", |_, _| 2.0)), &["`command` is constant"]);
     let pulse = spoilt(DRIVEN, "command", |time, _| if (3.0..3.5).contains(&time) { 4.0 } else { 2.0 });

@@ -7,6 +7,8 @@ pub(crate) mod sampling;
 pub(crate) mod sensors;
 mod units;
 
+pub(crate) use units::HIGHEST_PRESSURE;
+
 use crate::Result;
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
@@ -98,6 +100,18 @@ pub(crate) fn span(values: &[f64]) -> f64 {
 /// Range of the middle nine tenths of the present values: what they span without spikes.
 fn middle_span(values: &[f64]) -> f64 {
     quantile(values, 0.95).zip(quantile(values, 0.05)).map_or(0.0, |(high, low)| high - low)
+}
+
+/// Slope and offset of the straight line by which one signal best gives another, over the samples that both have; NaN where
+/// the first one rests.
+fn line(from: &[f64], to: &[f64]) -> (f64, f64) {
+    let pairs = || from.iter().zip(to).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let count = pairs().count() as f64;
+    let (mean_from, mean_to) =
+        (pairs().map(|(a, _)| a).sum::<f64>() / count, pairs().map(|(_, b)| b).sum::<f64>() / count);
+    let together: f64 = pairs().map(|(a, b)| (a - mean_from) * (b - mean_to)).sum();
+    let slope = together / pairs().map(|(a, _)| (a - mean_from).powi(2)).sum::<f64>();
+    (slope, mean_to - slope * mean_from)
 }
 
 /// Correlation of two signals over the samples that both have; 0 where one of them rests.

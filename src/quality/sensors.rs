@@ -1,7 +1,7 @@
 //! Sensors that do not follow what they measure, and columns that no sensor made.
 
 use super::{
-    asked_pressure, header, in_file_unit, is_measured, known_pressure, present, quantile, rounded, span, units,
+    asked_pressure, header, in_file_unit, is_measured, known_pressure, line, present, quantile, rounded, span, units,
 };
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
@@ -220,11 +220,7 @@ fn same_but_for_scale(from: &[f64], to: &[f64]) -> Option<(f64, f64)> {
     let (step_from, step_to) = (resolution(from)?, resolution(to)?);
     let both: Vec<(f64, f64)> =
         from.iter().copied().zip(to.iter().copied()).filter(|(a, b)| !a.is_nan() && !b.is_nan()).collect();
-    let mean = |pick: fn(&(f64, f64)) -> f64| both.iter().map(pick).sum::<f64>() / both.len() as f64;
-    let (mean_from, mean_to) = (mean(|pair| pair.0), mean(|pair| pair.1));
-    let together: f64 = both.iter().map(|(a, b)| (a - mean_from) * (b - mean_to)).sum();
-    let slope = together / both.iter().map(|(a, _)| (a - mean_from).powi(2)).sum::<f64>();
-    let offset = mean_to - slope * mean_from;
+    let (slope, offset) = line(from, to);
     // Half a step of either column, with room for the arithmetic.
     let allowed = 0.5 * (step_to + slope.abs() * step_from) + 1e-9 * span(to);
     let holds = both.iter().all(|(a, b)| (b - slope * a - offset).abs() <= allowed);

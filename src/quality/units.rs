@@ -1,6 +1,6 @@
 //! Columns whose size contradicts the others, the muscle or the valve: nearly always a wrong unit in the header.
 
-use super::{asked_pressure, correlation, header, in_file_unit, known_pressure, middle_span, quantile, rounded};
+use super::{asked_pressure, correlation, header, in_file_unit, known_pressure, line, middle_span, quantile, rounded};
 use crate::measurement::{Recording, Signal};
 use crate::parameters::Parameters;
 use crate::plant::{equilibrium, holding_pressure};
@@ -12,7 +12,7 @@ const PLANT: f64 = 3.162_277_660_168_379_5;
 /// No effect in a muscle or a valve, and no other muscle in its place, makes a signal a hundred times what it should be.
 const ABSURD: f64 = 100.0;
 /// No pneumatic muscle is run above this gauge pressure, Pa: compressed air comes at 6 to 10 bar, muscles burst above 20.
-const HIGHEST_PRESSURE: f64 = 20e5;
+pub(crate) const HIGHEST_PRESSURE: f64 = 20e5;
 /// Below this gauge pressure, Pa, no muscle does anything: it takes some 0.2 bar to widen its membrane.
 const LOWEST_PRESSURE: f64 = 0.02e5;
 /// The nominal model may be poor; a unit is wrong where another one makes the model's error this many times smaller.
@@ -33,7 +33,7 @@ struct Doubt {
 /// [`Error::Recording`] for a contradiction by a factor of 100 or more.
 pub fn notes(recording: &Recording, parameters: &Parameters) -> Result<Vec<String>> {
     let mut notes = Vec::new();
-    let checks: [fn(&Recording, &Parameters) -> Option<Doubt>; 8] = [
+    let checks: [fn(&Recording, &Parameters) -> Option<Doubt>; 9] = [
         too_much_pressure,
         command_against_pressure,
         longer_than_the_muscle,
@@ -42,6 +42,7 @@ pub fn notes(recording: &Recording, parameters: &Parameters) -> Result<Vec<Strin
         force_against_load,
         contraction_against_load,
         units_that_fit_better,
+        too_slow_for_the_valve,
     ];
     for check in checks {
         let Some(doubt) = check(recording, parameters) else { continue };
@@ -53,7 +54,7 @@ pub fn notes(recording: &Recording, parameters: &Parameters) -> Result<Vec<Strin
             break; // what follows compares with a column that is in doubt
         }
     }
-    notes.extend(wrong_sign(recording, parameters));
+    notes.extend(pushes(recording, parameters).or_else(|| wrong_sign(recording, parameters)));
     Ok(notes)
 }
 
@@ -238,6 +239,40 @@ fn units_that_fit_better(recording: &Recording, parameters: &Parameters) -> Opti
     Some(Doubt { signal, excess, evidence })
 }
 
+/// How long a signal takes to follow the command against the time constant of the valve.
+///
+/// An honest plant may be slow; the time is in doubt where another unit makes the plant as fast as the valve, and nobody would have
+/// sampled it so: the whole answer of the valve lies between two samples.
+fn too_slow_for_the_valve(recording: &Recording, parameters: &Parameters) -> Option<Doubt> {
+    let asked = asked_pressure(recording, parameters)?;
+    let hanging = recording.load_mass().map(|_| Signal::Contraction);
+    let driven = [Some(Signal::GaugePressure), hanging].into_iter().flatten();
+    let (signal, values) = driven.filter_map(|signal| Some((signal, recording.get(signal)?))).next()?;
+    let taken = time_to_follow(recording.period(), &asked, values)?;
+    let expected = 1.0 / parameters.valve.bandwidth;
+    let excess = taken / expected;
+    let evidence = format!(
+        "{} follows the command within {} s, and the valve answers within {} s",
+        header(recording, signal),
+        rounded(taken),
+        rounded(expected)
+    );
+    let in_doubt = recording.period() > expected && excess > 1.0;
+    let other = in_doubt && better_unit(recording, Signal::Time, excess).is_some();
+    other.then_some(Doubt { signal: Signal::Time, excess, evidence })
+}
+
+/// Time constant in s of a signal that follows another one as a lag of first order, sampled with a period in s; `None` where it does not
+/// follow, or within a sample. Scale and offset of the signal do not matter.
+fn time_to_follow(period: f64, leader: &[f64], signal: &[f64]) -> Option<f64> {
+    let (slope, offset) = line(leader, signal);
+    let ahead: Vec<f64> = leader.iter().zip(signal).map(|(u, y)| slope * u + offset - y).collect();
+    let change: Vec<f64> = signal.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let (share, _) = line(&ahead, &change);
+    let follows = correlation(leader, signal) > 0.5 && share > 0.0 && share < 1.0;
+    follows.then(|| -period / (1.0 - share).ln())
+}
+
 /// Error of the nominal static force relative to the measured one (rms), with the values of one column multiplied.
 fn misfit(recording: &Recording, parameters: &Parameters, changed: Option<(Signal, f64)>) -> Option<f64> {
     let factor = |signal: Signal| changed.filter(|(of, _)| *of == signal).map_or(1.0, |(_, factor)| factor);
@@ -255,6 +290,20 @@ fn misfit(recording: &Recording, parameters: &Parameters, changed: Option<(Signa
         }
     }
     (all > 0.0).then(|| (wrong / all).sqrt())
+}
+
+/// A force that is negative but for its spikes where a muscle pulls: under a hanging load, or as the nominal one does.
+fn pushes(recording: &Recording, parameters: &Parameters) -> Option<String> {
+    let pulls = || static_force(recording, parameters).and_then(|force| quantile(&force, 0.05)).unwrap_or(0.0) > 0.0;
+    let negative = quantile(recording.get(Signal::Force)?, 0.95)? < 0.0;
+    let text = || {
+        format!(
+            "{} is negative throughout; the pull of the muscle is positive: where the sensor counts it the other way, \
+             change the sign of the column",
+            header(recording, Signal::Force)
+        )
+    };
+    (negative && (recording.load_mass().is_some() || pulls())).then(text)
 }
 
 /// A signal that runs against what drives it. Correlations of −½ and below are beyond what lag and noise make.

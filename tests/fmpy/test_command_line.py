@@ -129,6 +129,33 @@ def test_bad_parameters_are_refused(sinew, tmp_path, text, named):
     assert not (tmp_path / "out").exists()
 
 
+def test_coefficients_of_another_force_model_are_noticed(sinew, tmp_path):
+    path = tmp_path / "foreign.toml"
+    path.write_text("[spring]\nlow_c0 = 1e5\n")
+    said = run(sinew, "export", "--parameters", path, "--out", tmp_path / "out").stderr
+    assert f"note: {path}: it gives coefficients in [spring]" in said and "choose the model" in said
+
+
+@pytest.mark.parametrize("given", [("simulate", "/dev/zero"), ("export", "--parameters", "/dev/zero")], ids=" ".join)
+def test_a_file_without_end_is_refused(sinew, tmp_path, given):
+    assert "/dev/zero: holds more than 1 GB, or never ends" in refusal(sinew, *given, "--out", tmp_path / "out")
+
+
+def test_a_recording_may_come_through_a_pipe(sinew, tmp_path):
+    text = (ROOT / "data" / "nominal_40kg.csv").read_text()
+    command = [sinew, "simulate", "/dev/stdin", "--out", tmp_path / "out"]
+    assert subprocess.run(command, input=text, text=True, capture_output=True).returncode == 0
+
+
+@pytest.mark.parametrize("option, value", [("--load-mass", "-5"), ("--load-mass", "20,0"), ("--load-mass", "nan"),
+                                           ("--most-pressure", "-5 bar"), ("--most-pressure", "1e308 bar"),
+                                           ("--most-contraction", "-1 mm"), ("--duration", "-10")])
+def test_limits_without_sense_are_named(sinew, tmp_path, option, value):
+    command = [sinew, "plan", "--effects", "all", option, value, "--out", tmp_path / "out"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2 and f"for '{option}" in done.stderr and "a positive number" in done.stderr
+
+
 @pytest.mark.parametrize("arguments", [
     ("export", "--parameters", "dmsp-99"),
     ("export", "--parameters", "absent.toml"),

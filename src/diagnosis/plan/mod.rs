@@ -15,12 +15,13 @@ pub use excitations::EXCITATIONS;
 pub use files::{files, matrix, outdated, to_json};
 pub use rivals::{Rival, Task};
 
-use super::hypothesis::{Off, corrections};
+use super::hypothesis::{Off, corrections, declared};
 use crate::measurement::Signal;
 use crate::parameters::Parameters;
+use crate::quality::HIGHEST_PRESSURE;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
-use power::{Bank, Corrections};
+use power::{Bank, Corrections, LEAST_CONTRACTION};
 
 /// λ from which two models are told apart beyond doubt: five standard deviations.
 pub const ENOUGH: f64 = 25.0;
@@ -32,6 +33,8 @@ const REPORTED: usize = 8;
 pub const USUAL_DURATION: f64 = 60.0;
 /// Highest gauge pressure by default, Pa.
 pub const USUAL_PRESSURE: f64 = 5e5;
+/// Shortest and longest recording that is planned, s: in less no load comes to rest, in an hour leaks and creep do.
+const DURATIONS: (f64, f64) = (1.0, 3600.0);
 /// Largest contraction of a FESTO muscle, as a share of its rest length.
 const LARGEST_STROKE: f64 = 0.25;
 
@@ -49,6 +52,26 @@ pub struct Limits {
 }
 
 impl Limits {
+    /// Refuses what no rig with this muscle can do, and what no recording is worth, by the option of `sinew plan`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`]; [`Error::Plan`] for loads that are missing or stand there twice.
+    fn check(&self, nominal: &Parameters) -> Result<()> {
+        let length = nominal.muscle.rest_length;
+        let shortest = LEAST_CONTRACTION * length;
+        within("--most-pressure", self.most_pressure, (0.0, HIGHEST_PRESSURE), "Pa")?;
+        within("--most-contraction", self.most_contraction(nominal), (shortest, length), "m")?;
+        within("--duration", self.duration, DURATIONS, "s")?;
+        let (load, _) = declared(nominal, "load.mass");
+        self.load_masses.iter().try_for_each(|mass| within("--load-mass", *mass, (load.min, load.max), "kg"))?;
+        let refuse = |problem: String| Err(Error::Plan { problem });
+        match (1..self.load_masses.len()).find(|k| self.load_masses[..*k].contains(&self.load_masses[*k])) {
+            Some(k) => refuse(format!("--load-mass: {} kg stands there twice: leave one out", self.load_masses[k])),
+            None if self.load_masses.is_empty() => refuse("--load-mass: give at least one load".to_owned()),
+            None => Ok(()),
+        }
+    }
+
     /// Largest contraction of a muscle in m.
     fn most_contraction(&self, model: &Parameters) -> f64 {
         self.most_contraction.unwrap_or(LARGEST_STROKE * model.muscle.rest_length)
@@ -215,6 +238,14 @@ impl Plan {
     }
 }
 
+/// Refuses what an option gives beyond its range, ends included.
+fn within(option: &str, value: f64, (min, max): (f64, f64), unit: &'static str) -> Result<()> {
+    if (min..=max).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::OutOfRange { variable: option.to_owned(), value, min, max, unit })
+}
+
 /// More rivals than this are surveyed: nothing is fitted, and nothing is asked for that the rig has not.
 const FEW_RIVALS: usize = 6;
 
@@ -235,7 +266,7 @@ pub fn pieces(limits: &Limits) -> usize {
 /// `tolerance` is the relative error that the nominal coefficients may have.
 ///
 /// # Errors
-/// [`Error::Plan`] where the limits leave no experiment.
+/// [`Error::OutOfRange`] for limits that make no sense, by the option that gives them; [`Error::Plan`] where they leave no experiment.
 pub fn plan(
     task: &Task,
     nominal: &Parameters,
@@ -243,6 +274,7 @@ pub fn plan(
     limits: &Limits,
     done: &(dyn Fn(&str) + Sync),
 ) -> Result<Plan> {
+    limits.check(nominal)?;
     let corrections = corrections(nominal, tolerance, Off::most(nominal));
     let bank = Bank::new(&task.rivals, nominal, slack(corrections), limits, done);
     let experiments = experiments(&bank, limits);

@@ -36,7 +36,7 @@ const SHUT: f64 = 1e-9;
 /// How much of the range of the pressure is used, tried one after the other until all models stay within the limits.
 const SHARES: [f64; 5] = [1.0, 0.85, 0.7, 0.55, 0.4];
 /// Contraction at the lowest pressure, as a share of the rest length: the load hangs, the braid is not stretched.
-const LEAST_CONTRACTION: f64 = 0.01;
+pub const LEAST_CONTRACTION: f64 = 0.01;
 /// Lengths at which a muscle is held, as shares of its rest length.
 const LOCKED: [f64; 2] = [0.06, 0.14];
 /// Of a refit.

@@ -2,12 +2,13 @@
 
 use crate::diagnosis::Verdict;
 use crate::diagnosis::hypothesis::{at_start, count_starts, declared, recording_of};
+use crate::diagnosis::report::EXTENDED;
 use crate::effects::{Description, Effects};
 use crate::measurement::Signal;
 use crate::parameters::Parameters;
 use crate::simulation::OUTPUTS;
 use crate::variables::Variable;
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::path::Path;
@@ -89,7 +90,7 @@ struct Source<'a> {
 
 impl<'a> Source<'a> {
     fn read(path: &'a Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        let bytes = input::read(path)?;
         let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
         let no_json = |error: serde_json::Error| Error::Diagnosis {
             path: path.to_owned(),
@@ -287,10 +288,10 @@ fn add<'a>(
 fn named(causes: &[Named], source: &Source, nominal: &Parameters) -> Result<Option<Rival>> {
     let ambiguous = |named: &&Named| named.cause["rivals"].as_object().is_some_and(|rivals| !rivals.is_empty());
     let Some(first) = causes.iter().find(ambiguous).or(causes.first()) else { return Ok(None) };
-    let beside = source.path.with_file_name("extended.toml");
+    let beside = source.path.with_file_name(EXTENDED.name);
     if !beside.is_file() {
         let problem =
-            "`extended.toml` must lie beside it: keep the folder together, or run `sinew diagnose` again".to_owned();
+            format!("`{}` must lie beside it: keep the folder together, or run `sinew diagnose` again", EXTENDED.name);
         return Err(Error::Diagnosis { path: source.path.to_owned(), problem });
     }
     let model = Parameters::load(&beside.display().to_string())?;

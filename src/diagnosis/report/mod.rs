@@ -1,4 +1,4 @@
-//! The diagnosis as files: `diagnosis.json`, `report.html`, `extended.toml`, `nominal.toml`, `simulated.csv` and the extended FMU.
+//! The diagnosis as files: those of [`FILES`].
 
 mod curves;
 mod exposure;
@@ -89,13 +89,44 @@ fn separating_experiment(diagnosis: &Diagnosis) -> Option<String> {
     Some(experiments.join("; and "))
 }
 
-/// A file of a diagnosis.
-struct Made {
-    name: String,
+/// A file that a diagnosis may write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Named {
+    /// Its name.
+    pub name: &'static str,
     /// What it is good for, in one line.
-    purpose: &'static str,
-    bytes: Vec<u8>,
+    pub purpose: &'static str,
 }
+
+impl Named {
+    const fn new(name: &'static str, purpose: &'static str) -> Self {
+        Self { name, purpose }
+    }
+}
+
+/// The FMU of the extended model.
+pub const FMU: Named = Named::new("PneumaticMuscle.fmu", "the extended model for any FMI 2.0 tool");
+/// The extended model.
+pub const EXTENDED: Named = Named::new("extended.toml", "parameters of the extended model, to edit and to export from");
+/// The model that was diagnosed.
+pub const NOMINAL: Named = Named::new("nominal.toml", "parameters of the model that was diagnosed, for `sinew plan`");
+/// Courses of all signals.
+pub const SIMULATED: Named = Named::new("simulated.csv", "measured, nominal and extended signals, SI units");
+/// What [`to_json`] gives.
+pub const DIAGNOSIS: Named = Named::new("diagnosis.json", "this diagnosis for machines");
+/// The model with a correction, where the cause is unknown.
+pub const CORRECTED: Named = Named::new("unknown_cause.toml", "the model with a correction of unknown cause");
+/// Its FMU.
+pub const CORRECTED_FMU: Named =
+    Named::new("PneumaticMuscle-unknown-cause.fmu", "the FMU with a correction of unknown cause");
+/// The report.
+pub const REPORT: Named = Named::new("report.html", "this page");
+
+/// All files that a diagnosis may write, in the order of the report.
+pub const FILES: [Named; 8] = [FMU, EXTENDED, NOMINAL, SIMULATED, DIAGNOSIS, CORRECTED, CORRECTED_FMU, REPORT];
+
+/// A file of a diagnosis with what it holds.
+type Made = (Named, Vec<u8>);
 
 /// All files of a diagnosis, as paths in `folder` with their bytes.
 ///
@@ -112,33 +143,18 @@ pub fn files(
     let extended = &diagnosis.extended;
     let both = |recording: &Recording| Ok([replay(nominal, recording)?, replay(extended, recording)?]);
     let replays = recordings.par_iter().map(both).collect::<Result<Vec<_>>>()?;
-    let made = |name: &str, purpose, bytes| Made { name: name.to_owned(), purpose, bytes };
-    let mut files = vec![
-        made(
-            "extended.toml",
-            "parameters of the extended model, to edit and to export from",
-            extended.to_toml().into(),
-        ),
-        made("nominal.toml", "parameters of the model that was diagnosed, for `sinew plan`", nominal.to_toml().into()),
-        made(
-            "simulated.csv",
-            "measured, nominal and extended signals, SI units",
-            simulated_csv(["nominal", "extended"], recordings, &replays),
-        ),
-        made("diagnosis.json", "this diagnosis for machines", format!("{:#}\n", to_json(diagnosis)).into()),
-    ];
-    if let Some(muscle) = models().into_iter().next() {
-        let interface = muscle.interface();
-        let name = format!("{}.fmu", interface.name);
-        files.insert(0, made(&name, "the extended model for any FMI 2.0 tool", fmu(interface, extended, libraries)));
-    }
-    if let (Some(correction), Some(muscle)) = (&diagnosis.correction, models().into_iter().next()) {
-        let (interface, model) = (muscle.interface(), &correction.parameters);
-        let name = format!("{}-unknown-cause.fmu", interface.name);
-        files.push(made("unknown_cause.toml", "the model with a correction of unknown cause", model.to_toml().into()));
-        files.push(made(&name, "the FMU with a correction of unknown cause", fmu(interface, model, libraries)));
+    let fmu = |model: &Parameters| models().first().map(|muscle| fmu(muscle.interface(), model, libraries));
+    let mut files: Vec<Made> = fmu(extended).into_iter().map(|fmu| (FMU, fmu)).collect();
+    files.push((EXTENDED, extended.to_toml().into()));
+    files.push((NOMINAL, nominal.to_toml().into()));
+    files.push((SIMULATED, simulated_csv(["nominal", "extended"], recordings, &replays)));
+    files.push((DIAGNOSIS, format!("{:#}\n", to_json(diagnosis)).into()));
+    if let Some(correction) = &diagnosis.correction {
+        let model = &correction.parameters;
+        files.push((CORRECTED, model.to_toml().into()));
+        files.extend(fmu(model).map(|fmu| (CORRECTED_FMU, fmu)));
     }
     let page = page::html(diagnosis, nominal, recordings, &replays, &files);
-    files.push(made("report.html", "this page", page.into()));
-    Ok(files.into_iter().map(|file| (folder.join(file.name), file.bytes)).collect())
+    files.push((REPORT, page.into()));
+    Ok(files.into_iter().map(|(file, bytes)| (folder.join(file.name), bytes)).collect())
 }

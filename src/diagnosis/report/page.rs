@@ -49,7 +49,7 @@ pub fn html(
         gain => gain(diagnosis),
         which_samples => which_samples(diagnosis),
         notes => notes(diagnosis, recordings),
-        files => files.iter().map(|file| context! { name => file.name.clone(), purpose => file.purpose }).collect::<Vec<_>>(),
+        files => files.iter().map(|(file, _)| context! { name => file.name, purpose => file.purpose }).collect::<Vec<_>>(),
         causes => causes.map(|(cause, exposed)| cause_context(cause, *exposed, &residuals)).collect::<Vec<_>>(),
         unknown,
         shows => exposed[0].filter(|_| unknown).map(|exposed| exposed_context(exposed, &residuals)),
