@@ -423,7 +423,7 @@ mod tests {
             [ended(f64::INFINITY), ended(9.1), ended(8.0)],
             [Ended::Converged, Ended::Converged, Ended::GivenUp]
         );
-        // 90 % are left each time: after three more 73 of a hundred, after ten 0.9 in a straight line.
+        // 12.3 less each time: 63 after three more, and less than nothing after ten.
         let costs = [137.0, 123.0, 111.0, 100.0];
         assert!(is_too_slow(&costs, 3, 60.0) && !is_too_slow(&costs, 3, 70.0) && !is_too_slow(&costs, 10, 0.0));
         assert!(!is_too_slow(&costs[..3], 3, 1.0), "too early to tell");

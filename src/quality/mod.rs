@@ -102,28 +102,31 @@ fn middle_span(values: &[f64]) -> f64 {
     quantile(values, 0.95).zip(quantile(values, 0.05)).map_or(0.0, |(high, low)| high - low)
 }
 
-/// Slope and offset of the straight line by which one signal best gives another, over the samples that both have; NaN where
-/// the first one rests.
-fn line(from: &[f64], to: &[f64]) -> (f64, f64) {
-    let pairs = || from.iter().zip(to).filter(|(a, b)| a.is_finite() && b.is_finite());
-    let count = pairs().count() as f64;
-    let (mean_from, mean_to) =
-        (pairs().map(|(a, _)| a).sum::<f64>() / count, pairs().map(|(_, b)| b).sum::<f64>() / count);
-    let together: f64 = pairs().map(|(a, b)| (a - mean_from) * (b - mean_to)).sum();
-    let slope = together / pairs().map(|(a, _)| (a - mean_from).powi(2)).sum::<f64>();
-    (slope, mean_to - slope * mean_from)
-}
-
-/// Correlation of two signals over the samples that both have; 0 where one of them rests.
-pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+/// Means of two signals, and the sums of products of their deviations from these: of the first with itself, of both, of the second with
+/// itself; over the samples that both have.
+fn moments(a: &[f64], b: &[f64]) -> ([f64; 2], [f64; 3]) {
     let pairs: Vec<(f64, f64)> =
         a.iter().copied().zip(b.iter().copied()).filter(|(a, b)| a.is_finite() && b.is_finite()).collect();
     let mean = |pick: fn(&(f64, f64)) -> f64| pairs.iter().map(pick).sum::<f64>() / pairs.len() as f64;
     let (mean_a, mean_b) = (mean(|pair| pair.0), mean(|pair| pair.1));
     let sum =
         |product: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|(a, b)| product(a - mean_a, b - mean_b)).sum::<f64>();
-    let scale = (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
-    if scale > 0.0 { sum(&|a, b| a * b) / scale } else { 0.0 }
+    ([mean_a, mean_b], [sum(&|a, _| a * a), sum(&|a, b| a * b), sum(&|_, b| b * b)])
+}
+
+/// Slope and offset of the straight line by which one signal best gives another, over the samples that both have; NaN where
+/// the first one rests.
+fn line(from: &[f64], to: &[f64]) -> (f64, f64) {
+    let ([mean_from, mean_to], [own, both, _]) = moments(from, to);
+    let slope = both / own;
+    (slope, mean_to - slope * mean_from)
+}
+
+/// Correlation of two signals over the samples that both have; 0 where one of them rests.
+pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let (_, [of_a, of_both, of_b]) = moments(a, b);
+    let scale = (of_a * of_b).sqrt();
+    if scale > 0.0 { of_both / scale } else { 0.0 }
 }
 
 /// Gauge pressure in Pa, shape `(n_samples,)`: measured, or else what the command asks for.
