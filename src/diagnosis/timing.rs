@@ -165,11 +165,15 @@ struct Compared<'a> {
 }
 
 impl Compared<'_> {
-    /// Which other way explains what the nominal model leaves far better, and so well that no valve that is late by itself has the odds against it.
+    /// Which other way explains the data far better with the nominal model, and a good part of what it leaves: beside other errors half a sampling
+    /// interval may be better by chance. No valve that is late by itself has the odds against it.
     fn needed_at_once(&self, way: &Way) -> Option<usize> {
         let (bench, baseline) = (way.bench(), way.baseline());
         let own = self.losses(0, 0, baseline)?;
-        let (best, going) = self.far_better_again(&[own], [baseline].into_iter())?;
+        let (best, going) = self.far_better_again(std::slice::from_ref(&own), [baseline].into_iter())?;
+        if !self.is_worth_it(0, &own, &going) {
+            return None;
+        }
         let base = bench.base(baseline);
         let mut late = LATE.into_iter().filter_map(|name| {
             let start = bench.starts(&base, Effects::description(name)?).into_iter().next()?;
@@ -208,8 +212,13 @@ impl Compared<'_> {
             let again = self.exact_fit_again(&found.chosen.best, *other, found.bench().off)?;
             Some((*other, self.losses(now, *other, &again)?))
         });
-        let is_worth_it = |other: &[Loss]| explained(own, other, &self.data[now]) >= MAY_COME_FURTHER;
-        best(again.filter(|(_, other)| is_worth_it(other) && is_far_better(own, other))).map(|(best, _)| best)
+        let is_worth_it = |other: &[Loss]| self.is_worth_it(now, own, other) && is_far_better(own, other);
+        best(again.filter(|(_, other)| is_worth_it(other))).map(|(best, _)| best)
+    }
+
+    /// Whether a good part goes away of what losses leave, as the noise of a judging way has it.
+    fn is_worth_it(&self, judge: usize, own: &[Loss], other: &[Loss]) -> bool {
+        explained(own, other, &self.data[judge]) >= MAY_COME_FURTHER
     }
 
     /// Which of some other ways is so likely with one of the causes less than were found in one that this one has not the odds against it.
