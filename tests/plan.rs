@@ -73,6 +73,13 @@ fn a_plan_respects_the_limits_and_reads_back() {
 }
 
 #[test]
+fn a_sensor_that_is_named_twice_counts_once() {
+    let names = ["payload_mass", "force_gain"].map(str::to_owned);
+    let of = |sensors: &[Signal]| Task::of_effects(&names, sensors, &Parameters::default()).unwrap().sensors;
+    assert_eq!(of(&[Signal::Force, Signal::Contraction, Signal::Force]), of(&[Signal::Contraction, Signal::Force]));
+}
+
+#[test]
 fn limits_that_leave_nothing_are_refused_with_a_sentence() {
     let task = Task::of_effects(&["creep".to_owned(), "leakage".to_owned()], &[Signal::Force], &Parameters::default());
     let limits = Limits { most_pressure: 1e4, ..limits(&[80.0]) };

@@ -9,7 +9,7 @@
 //! Points that repeat another to the last digit are worth one.
 
 use crate::measurement::{Recording, Signal};
-use crate::simulation::slopes;
+use crate::simulation::{mean, slopes};
 use crate::{Error, GRAVITY, Result};
 use serde::Serialize;
 
@@ -344,10 +344,6 @@ fn mark_branches(points: &mut [Point], rows: bool) {
             points[k].branch = points[k + 1].branch;
         }
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// At most `most` of so many positions, ascending: without a stride, which on a grid would meet few of its columns.

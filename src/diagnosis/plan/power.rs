@@ -287,9 +287,10 @@ fn samples_in(duration: f64) -> usize {
 
 /// Lowest and highest gauge pressure of a run in Pa; `None` where the limits leave nothing between them.
 fn pressures(model: &Parameters, place: Place, limits: &Limits) -> Option<(f64, f64)> {
-    let (low, high) = match place.load_mass() {
-        None => (0.0, limits.most_pressure),
-        Some(mass) => {
+    let (low, high) = match place {
+        Place::Locked(share) if share * model.muscle.rest_length > limits.most_contraction(model) => return None,
+        Place::Locked(_) => (0.0, limits.most_pressure),
+        Place::Load(mass) | Place::ValveShut(mass) => {
             let holding = |contraction: f64| holding_pressure(model, contraction, mass * GRAVITY);
             let at_top = holding(limits.most_contraction(model));
             // Where no pressure reaches the largest contraction, the area is negative there.
@@ -425,5 +426,14 @@ mod tests {
         let apart = DVector::from_row_slice(&[1.0, 0.0, 0.0]);
         assert!((left(&products, &apart, &[1], &[]) - 1.0).abs() < 1e-12);
         assert!((left(&products, &apart, &[1], &[2]) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_muscle_is_not_held_beyond_its_largest_contraction() {
+        let model = Parameters::default();
+        let limits =
+            Limits { most_pressure: 4e5, most_contraction: Some(0.1), load_masses: vec![20.0], duration: 40.0 };
+        let allowed = LOCKED.map(|share| pressures(&model, Place::Locked(share), &limits));
+        assert_eq!(allowed, [Some((0.0, 4e5)), None]);
     }
 }

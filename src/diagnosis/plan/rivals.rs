@@ -10,6 +10,7 @@ use crate::simulation::OUTPUTS;
 use crate::variables::Variable;
 use crate::{Error, Result, input};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::path::Path;
 
@@ -203,7 +204,9 @@ impl Task {
             return Err(Error::Plan { problem: "name at least two effects that are to be told apart".to_owned() });
         }
         let why = if names.is_empty() { "any cause, at its usual size".to_owned() } else { names.join(", ") };
-        let sensors = sensors.iter().map(|signal| (*signal, usual_noise(*signal))).collect();
+        // A sensor that is named twice is there once.
+        let sensors: BTreeSet<Signal> = sensors.iter().copied().collect();
+        let sensors = sensors.into_iter().map(|signal| (signal, usual_noise(signal))).collect();
         Ok(Self {
             why,
             rivals: chosen.into_iter().map(|effect| Rival::usual(effect, nominal)).collect(),
