@@ -170,10 +170,8 @@ impl Compared<'_> {
     fn needed_at_once(&self, way: &Way) -> Option<usize> {
         let (bench, baseline) = (way.bench(), way.baseline());
         let own = self.losses(0, 0, baseline)?;
-        let (best, going) = self.far_better_again(std::slice::from_ref(&own), [baseline].into_iter())?;
-        if !self.is_worth_it(0, &own, &going) {
-            return None;
-        }
+        let far_better = self.far_better_again(std::slice::from_ref(&own), [baseline].into_iter());
+        let (best, going) = far_better.filter(|(_, going)| self.is_worth_it(0, &own, going))?;
         let base = bench.base(baseline);
         let mut late = LATE.into_iter().filter_map(|name| {
             let start = bench.starts(&base, Effects::description(name)?).into_iter().next()?;
@@ -212,8 +210,8 @@ impl Compared<'_> {
             let again = self.exact_fit_again(&found.chosen.best, *other, found.bench().off)?;
             Some((*other, self.losses(now, *other, &again)?))
         });
-        let is_worth_it = |other: &[Loss]| self.is_worth_it(now, own, other) && is_far_better(own, other);
-        best(again.filter(|(_, other)| is_worth_it(other))).map(|(best, _)| best)
+        let better = again.filter(|(_, other)| self.is_worth_it(now, own, other) && is_far_better(own, other));
+        best(better).map(|(best, _)| best)
     }
 
     /// Whether a good part goes away of what losses leave, as the noise of a judging way has it.
